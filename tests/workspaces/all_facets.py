@@ -1,4 +1,4 @@
-"""Margins the slow way: normals by singular values, pulls on fine grids; and robots that are hard on the bracket."""
+"""Margins by a slow reference: normals by singular values, sag forces on fine grids; and robots that are hard cases."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import sagline as sl
 from sagline.core.arrays import Array
 
 GRID = 4000
-LOOSEST = 5.0  # half a cable's weight over its chord tension: fifteen times as long as its chord, see `margin`
+LOOSEST = 5.0  # half of the weight of a cable over its chord tension: fifteen times as long as its chord, see `margin`
 Support = Callable[[Array], Array]  # of normals (F, 6): the largest -y . w over a set, (F,)
 PATTERNS = {"2T": 2, "3T": 3, "1R2T": 3, "3R3T": 6}
 
 
 class Pulls(NamedTuple):
-    """Of the cables at one pose: chord tensions at their limits, pulls there, and pulls minus secants, (m,) each."""
+    """Sag forces of the cables at one pose: chord tensions at limits, sag forces there, and minus secants, (m,)."""
 
     low: Array
     high: Array
@@ -29,17 +29,17 @@ class Pulls(NamedTuple):
 
     @property
     def slope(self) -> Array:
-        """Of the secant."""
+        """Slope of the secant."""
         wide = self.high > self.low
         return np.where(wide, (self.at_high - self.at_low) / np.where(wide, self.high - self.low, 1.0), 0.0)
 
     def ends_only(self) -> Pulls:
-        """What somebody would take for the curves who looks at the ends alone."""
+        """Bounds of the curves from their ends only, a wrong method for comparison."""
         return self._replace(least=0.0 * self.low, most=0.0 * self.low)
 
 
 class Answer(NamedTuple):
-    """Margins over all facets [N], and for each of the three the facet's normal, (6,)."""
+    """Margins over all facets [N], and the normals of the three facets, (6,)."""
 
     value: float
     low: float
@@ -48,7 +48,7 @@ class Answer(NamedTuple):
 
 
 def pulls_on_a_grid(robot: sl.Robot, pose: sl.Pose, model: sl.CableModel) -> Pulls:
-    """By looking at a few thousand tensions; limits are those of the chord tension."""
+    """From a few thousand tensions; limits are those of the chord tension."""
     run = pose.transform(robot.platform_anchors) - robot.frame_anchors
     span, rise = np.hypot(run[:, 0], run[:, 1]), run[:, 2]
     low, high = robot.tension_min.copy(), robot.tension_max.copy()
@@ -71,7 +71,7 @@ def mean_arm(robot: sl.Robot) -> float:
 
 
 def all_facets(robot: sl.Robot, pose: sl.Pose, pulls: Pulls, support: Support, arm: float) -> Answer:
-    """The margin over the normals of all subsets of the secants, both sides, moments of all free motions kept."""
+    """Margin over the normals of all subsets of the secants, in both directions, with moments of all free motions."""
     freedom = robot.freedom
     n, m = len(freedom), robot.cable_count
     run = pose.transform(robot.platform_anchors) - robot.frame_anchors
@@ -103,12 +103,12 @@ def all_facets(robot: sl.Robot, pose: sl.Pose, pulls: Pulls, support: Support, a
 
 
 def no_load(normals: Array) -> Array:
-    """The support of the weight alone."""
+    """Support of the weight only."""
     return np.zeros(len(normals))
 
 
 def crafted(rng: np.random.Generator, pattern: str, extra: int | None = None, *, deep: bool = True) -> sl.Robot:
-    """A robot with heavy, soft cables on all sides, whose least tensions let them sag deep."""
+    """A robot with heavy, soft cables on all sides that sag far at their lower limits."""
     n = PATTERNS[pattern]
     m = n + (int(rng.integers(1, 3)) if extra is None else extra)
     planar = pattern in ("2T", "1R2T")

@@ -1,4 +1,4 @@
-"""Robots with heavy cables, whose workspaces are compared with the verdicts of the inverse at random positions."""
+"""Robots with heavy cables, whose workspaces are compared with verdicts of the inverse at random positions."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from sagline.core.arrays import Array
 from sagline.workspaces.surface import normals_of
 from sagline.workspaces.workspace import BY_BOX
 
-BLOCK = 20_000  # positions for one call
-ASIDE = 1e-3  # [m], that verdicts are asked beside the boundary
+BLOCK = 20_000  # positions per call
+ASIDE = 1e-3  # [m], distance of the verdicts from the boundary
 PRESETS = ("article-suspended", "article-mixed", "cogiro", "ipanema-1", "ipanema-3")
 
 
@@ -30,7 +30,7 @@ class Compared(NamedTuple):
 
     @property
     def away(self) -> float:
-        """Difference of the volumes over the error bar and two standard deviations."""
+        """Difference of the volumes in error bars and two standard deviations."""
         beyond = max(abs(self.space.volume - self.volume) - self.borderline, 0.0)
         return beyond / (self.space.volume_error + 2.0 * self.deviation)
 
@@ -43,7 +43,7 @@ def with_density(name: str, density: float, **changes: object) -> sl.Robot:
 
 
 def three_robots() -> Iterator[tuple[str, sl.Robot]]:
-    """Robots whose hulls by the middle of the range of the sag forces were off by 3 to 10 %."""
+    """Robots whose hulls by the middle of the range of sag forces are wrong by 3 to 10 %."""
     yield "article-suspended, 0.67 kg/m", with_density("article-suspended", 0.67)
     yield "cogiro, 0.3 kg/m", with_density("cogiro", 0.3, tension_limits_of="frame_end", tension_min=10.0)
     yield "article-mixed, 0.3 kg/m", with_density("article-mixed", 0.3, tension_limits_of="frame_end", tension_min=25.0)
@@ -84,7 +84,7 @@ def compared(robot: sl.Robot, count: int, cells: int, rng: np.random.Generator) 
 
 
 def _right_vertices(robot: sl.Robot, space: sl.Workspace) -> float:
-    """Share of vertices off the box with no wrong verdict inside or outside."""
+    """Share of vertices inside the box without a wrong verdict on either side."""
     vertices, faces = space.surface.vertices, space.surface.faces
     by_box = np.unique(faces[(space.limiting[faces] == BY_BOX).any(axis=1)])
     free = np.setdiff1d(np.arange(len(vertices)), by_box)

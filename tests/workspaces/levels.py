@@ -9,7 +9,7 @@ from tests.workspaces.shapes import Level
 
 
 def level_of(robot: sl.Robot, model: sl.CableModel) -> Level:
-    """The margin without a load but the weight [N]."""
+    """Margin with no load except the weight [N]."""
     rows = MarginRows(robot, model=model)
 
     def level(positions: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Random boxes of poses, what is proved of them, and poses in them at which the inverse says otherwise."""
+"""Random boxes of poses, their proofs, and poses in them with a contradicting verdict of the inverse."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from sagline.workspaces.proof import PRECISION, Prover
 from sagline.workspaces.wrench_sets import load_of
 
 CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-RANDOM = 8  # poses a box, beside its corners
-SIZES = np.geomspace(0.02, 0.15, 6)  # of the boxes, as a share of the frame
+RANDOM = 8  # poses per box, in addition to its corners
+SIZES = np.geomspace(0.02, 0.15, 6)  # of the boxes, relative to the frame
 _CATENARY = sl.Catenary()
 
 
@@ -26,7 +26,7 @@ def contradictions(
     turns: tuple[float, ...] = (0.0,),
     precision: tuple[float, float] = PRECISION,
 ) -> tuple[int, int, int]:
-    """How many poses in boxes proved inside and outside were looked at, and at how many the inverse contradicts.
+    """Numbers of examined poses in boxes proved inside and outside, and of poses with contradicting verdicts.
 
     Outside a set of loads that is a proof of the margin that all of it is borne.
     """
@@ -65,11 +65,11 @@ def _poses(parts: list[tuple[Array, Array]]) -> sl.Pose:
 def _not_inside(
     robot: sl.Robot, poses: sl.Pose, model: sl.CableModel, wrenches: sl.WrenchSet | None, rng: np.random.Generator
 ) -> int:
-    """At how many poses a load of a set is not balanced: one load a pose."""
+    """Number of poses at which a load of a set is not balanced, one load per pose."""
     if not len(poses):
         return 0
     load = _one_each(robot, wrenches, len(poses), rng)
-    # with no lower chord limit the tensions of least norm may leave a cable slack: others do not
+    # without a lower chord limit the minimum norm may leave a cable slack; other tensions do not
     may_be_slack = (robot.tension_min == 0.0).any() or robot.tension_limits_of == "frame_end"
     sharing = sl.AnalyticCenter() if may_be_slack else sl.MinimumNorm()
     status = sl.inverse(robot, poses, wrench=load, model=model, tension=sharing, stability=False).status
@@ -85,7 +85,7 @@ def _not_outside(robot: sl.Robot, poses: sl.Pose, model: sl.CableModel, wrenches
 
 
 def _one_each(robot: sl.Robot, wrenches: sl.WrenchSet | None, count: int, rng: np.random.Generator) -> Array:
-    """A wrench of the set for each pose, half of them at its corners; of level poses where it holds accelerations."""
+    """A wrench of the set for each pose, half of them at its corners; for level poses if it contains accelerations."""
     load = load_of(wrenches)
     wrench = np.tile(load.center, (count, 1))
     signs = rng.uniform(-1.0, 1.0, (count, len(load.segments) + 6))

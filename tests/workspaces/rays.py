@@ -1,7 +1,6 @@
 """Hull of the points seen along rays from one point, for comparison with the boundary.
 
-It is the boundary only of a set that the center sees all of; the boundary of any set is found by
-`sagline.workspaces.boundary`.
+It is the boundary only if the center sees the whole set. `sagline.workspaces.boundary` finds the boundary of any set.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ from sagline.workspaces.grid import Brackets, Level, brackets, crossings, crossi
 from sagline.workspaces.surface import Surface
 
 ITERATIONS: Final = 100  # of facets that replace one another along a ray: three are usual
-SHARP: Final = 1e-5  # of the level at a bracket's ends, which are a hundredth of a ray apart and less
-CLOSE: Final = 1e-7  # a level that is taken for zero from below
+SHARP: Final = 1e-5  # of facets that limit consecutive parts of a ray: three are usual
+CLOSE: Final = 1e-7  # of the level at the ends of a bracket of at most a hundredth of a ray
 
 _POLES: Final = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
 _OCTANTS: Final = np.array(

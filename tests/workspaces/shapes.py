@@ -1,4 +1,4 @@
-"""Sets whose volume is known: level functions, >= 0 inside."""
+"""Sets with known volumes: level functions, >= 0 inside."""
 
 from collections.abc import Callable, Sequence
 
@@ -28,22 +28,22 @@ def brick(center: ArrayLike, half: ArrayLike, turn: Rotation | None = None) -> L
 
 
 def both(levels: Sequence[Level]) -> Level:
-    """What is in all of some sets."""
+    """Intersection of sets."""
     return lambda p: np.min([level(p) for level in levels], axis=0)
 
 
 def any_of(levels: Sequence[Level]) -> Level:
-    """What is in one of some sets."""
+    """Union of sets."""
     return lambda p: np.max([level(p) for level in levels], axis=0)
 
 
 def outside(level: Level) -> Level:
-    """What is not in a set."""
+    """Complement of a set."""
     return lambda p: -level(p)
 
 
 class Counted:
-    """A level function that counts the positions it is asked for, and keeps them."""
+    """A level function that counts and stores its positions."""
 
     def __init__(self, level: Level) -> None:
         self.level = level
@@ -55,5 +55,5 @@ class Counted:
 
     @property
     def positions(self) -> Array:
-        """All of them, shape (N, 3)."""
+        """All positions, shape (N, 3)."""
         return np.concatenate(self.asked)

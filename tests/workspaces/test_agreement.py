@@ -24,7 +24,7 @@ def of_random_robots(seed: int, robots: int, poses: int) -> Counter[str]:
     ("robots", "poses"),
     [(6, 15), pytest.param(60, 50, marks=extended), pytest.param(2600, 100, marks=pytest.mark.soak)],
 )
-def test_five_functions_do_not_contradict_each_other(robots: int, poses: int) -> None:
+def test_five_functions_agree(robots: int, poses: int) -> None:
     found = of_random_robots(1, robots, poses)
     print(dict(found))
     assert {name: count for name, count in found.items() if name not in COUNTED} == {}

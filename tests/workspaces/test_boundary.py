@@ -50,7 +50,7 @@ def corners_of(found: Boundary) -> tuple[Array, Array, Array]:
 
 @pytest.mark.parametrize("refine", [False, True])
 @pytest.mark.parametrize("name", wide(SETS, first=2))
-def test_volume_pieces_and_vertices_are_those_of_the_set(name: str, refine: bool) -> None:
+def test_volume_pieces_and_vertices_agree_with_the_set(name: str, refine: bool) -> None:
     level, volumes = SETS[name]
     counted = Counted(level)
     found = boundary(counted, LOW, HIGH, cells=24 if refine else 40, refine=refine)
@@ -67,14 +67,14 @@ def test_volume_pieces_and_vertices_are_those_of_the_set(name: str, refine: bool
     assert enclosed > 0.0
 
 
-def test_no_position_is_asked_for_twice() -> None:
+def test_no_position_is_evaluated_twice() -> None:
     counted = Counted(SETS["turned brick"][0])
     boundary(counted, LOW, HIGH, cells=16)
     assert len(np.unique(counted.positions, axis=0)) == len(counted.positions)
 
 
 @extended
-def test_evaluations_grow_with_the_square_of_the_cells_but_for_the_coarse_grid() -> None:
+def test_evaluations_grow_with_the_square_of_the_cells() -> None:
     level, _ = SETS["ball"]
     counts = [boundary(level, LOW, HIGH, cells=n).evaluations - (n + 1) ** 3 for n in (16, 32, 64)]
     assert counts[1] < 4.2 * counts[0]
@@ -95,7 +95,7 @@ def test_cells_that_a_finer_neighbor_finds_crossed_are_evaluated_too() -> None:
     for cells in (8, 10, 12, 14):
         counted = Counted(rough)
         found = boundary(counted, LOW, HIGH, cells=cells)
-        assert len(counted.asked[2]) < len(counted.asked[1])  # the nodes of these cells; then come the vertices
+        assert len(counted.asked[2]) < len(counted.asked[1])  # the nodes of these cells, before the vertices
         assert np.abs(rough(found.surface.vertices)).max() < 1e-10
         assert is_watertight(found)
 
@@ -123,12 +123,12 @@ def test_the_true_volume_is_within_the_error_bar(kind: str, seed: int) -> None:
         level = lambda p: np.where(solid(p) >= 0.0, np.inf, -np.inf)  # noqa: E731 - of what stands above
     found = boundary(level, LOW, HIGH, cells=cells, refine=bool(seed % 2))
     assert abs(found.volume - volume) <= found.volume_error
-    assert found.volume_error < 0.5 * (2.0 / cells)  # and is of use
+    assert found.volume_error < 0.5 * (2.0 / cells)  # and is small
     assert is_watertight(found)
 
 
-def test_error_bar_holds_what_grids_that_agree_do_not_see() -> None:
-    # from the edges to the nodes inside it is as far at every halving: each chamfer is as wrong as the one before
+def test_the_error_bar_includes_errors_common_to_all_grids() -> None:
+    # the distance from the edges to the inner nodes is the same at every halving, so all grids have the same error
     third = 2.0 / 3.0 - 1e-9
     level = brick([0.0, 0.0, 0.0], [third, third, third])
     bars = [boundary(level, LOW, HIGH, cells=n, refine=False) for n in (8, 16)]
@@ -136,14 +136,14 @@ def test_error_bar_holds_what_grids_that_agree_do_not_see() -> None:
         assert abs(found.volume - 8.0 * third**3) <= found.volume_error
 
 
-def test_curved_surfaces_are_measured_to_the_fourth_order() -> None:
+def test_volumes_of_curved_surfaces_have_fourth_order() -> None:
     level, volumes = SETS["ball"]
     off = [abs(boundary(level, LOW, HIGH, cells=n, refine=False).volume - volumes[0]) for n in (10, 20, 40)]
     assert off[0] < 1e-3 * volumes[0]
     assert off[2] < off[0] / 4.0**3
 
 
-def test_vertices_are_where_the_sign_changes_also_at_jumps() -> None:
+def test_vertices_are_at_sign_changes_and_jumps() -> None:
     def level(p: np.ndarray) -> np.ndarray:
         length = np.linalg.norm(p - [0.1, 0.0, 0.0], axis=1)
         outside = np.where(p[:, 2] > 0.3, -np.inf, -1e5)
@@ -153,12 +153,12 @@ def test_vertices_are_where_the_sign_changes_also_at_jumps() -> None:
     vertices = found.surface.vertices
     length = np.linalg.norm(vertices - [0.1, 0.0, 0.0], axis=1)
     assert_allclose(length, 0.6, rtol=0.0, atol=1e-10)
-    assert (level(vertices) >= 0.0).all()  # the last that is known to be inside
+    assert (level(vertices) >= 0.0).all()  # the last position known to be inside
     assert found.evaluations < 400_000
     assert abs(found.volume - BALL * 0.6**3) <= found.volume_error
 
 
-def test_a_set_that_overruns_the_box_ends_in_its_faces_exactly() -> None:
+def test_a_set_beyond_the_box_ends_exactly_at_its_faces() -> None:
     found = boundary(ball([0.0, 0.0, 1.0], 0.7), LOW, HIGH, cells=20)
     assert found.open_faces == ("z high",)
     assert abs(found.volume - BALL * 0.7**3 / 2.0) <= found.volume_error
@@ -181,20 +181,20 @@ def test_an_empty_set_has_no_volume_and_no_pieces() -> None:
     assert len(found.surface.faces) == 0
     assert found.surface.closed
     assert found.components.label([0.0, 0.0, 0.0]) == -1
-    assert found.grid.values.max() == -1.0  # where the nearest is, the grid still says
+    assert found.grid.values.max() == -1.0  # the grid still gives the nearest position
 
 
-def test_a_box_that_is_not_a_cube_gets_cells_that_are_nearly_cubes() -> None:
+def test_cells_of_any_box_are_nearly_cubes() -> None:
     found = boundary(ball([2.0, 0.5, 1.0], 0.4), [0.0, 0.0, 0.0], [4.0, 1.0, 2.0], cells=32)
     assert found.grid.values.shape == (33, 9, 17)
     assert_allclose(found.grid.step, 0.125)
     assert abs(found.volume - BALL * 0.4**3) <= found.volume_error
-    flat = boundary(lambda p: 0.4 - np.hypot(p[:, 0], p[:, 2]), LOW, HIGH, cells=(32, 1, 32))  # the same all along y
+    flat = boundary(lambda p: 0.4 - np.hypot(p[:, 0], p[:, 2]), LOW, HIGH, cells=(32, 1, 32))  # constant along y
     assert abs(flat.volume - 2.0 * np.pi * 0.4**2) <= flat.volume_error
     assert flat.open_faces == ("y low", "y high")
 
 
-def test_values_of_zero_at_nodes_leave_no_triangle_without_area() -> None:
+def test_zero_values_at_nodes_give_no_degenerate_triangles() -> None:
     found = boundary(SETS["brick on the nodes"][0], LOW, HIGH, cells=16)
     a, b, c = corners_of(found)
     assert 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1e-6
@@ -203,7 +203,7 @@ def test_values_of_zero_at_nodes_leave_no_triangle_without_area() -> None:
     assert sheet.surface.closed
 
 
-def test_mesh_is_closed_and_its_pieces_are_those_of_the_nodes_whatever_the_signs() -> None:
+def test_the_mesh_is_closed_for_random_signs() -> None:
     from scipy.ndimage import label
 
     rng = np.random.default_rng(3)
@@ -212,7 +212,7 @@ def test_mesh_is_closed_and_its_pieces_are_those_of_the_nodes_whatever_the_signs
         signs = np.where(rng.random(shape) < rng.choice([0.2, 0.5, 0.8]), 1.0, -1.0)
 
         def level(p: np.ndarray, signs: np.ndarray = signs, shape: np.ndarray = shape) -> np.ndarray:
-            assert (np.abs(p) <= 1.0 + 1e-15).all()  # nothing outside the box is asked for
+            assert (np.abs(p) <= 1.0 + 1e-15).all()  # no position outside the box is evaluated
             at = np.rint((p + 1.0) / 2.0 * (shape - 1)).astype(int)
             return np.asarray(signs[tuple(at.T)])
 
@@ -225,7 +225,7 @@ def test_mesh_is_closed_and_its_pieces_are_those_of_the_nodes_whatever_the_signs
         assert (pieces == pieces[:, :1]).all()
 
 
-def test_positions_are_told_by_piece() -> None:
+def test_positions_are_assigned_to_pieces() -> None:
     found = boundary(SETS["two balls"][0], LOW, HIGH, cells=20)
     assert_allclose(found.components.label([[-0.45, 0.0, 0.1], [0.5, 0.1, 0.0], [0.79, 0.1, 0.0]]), [0, 1, 1])
     assert found.components.label([0.0, -0.9, 0.0]) == -1
@@ -248,14 +248,14 @@ def test_positions_are_told_by_piece() -> None:
         ({"level": lambda p: np.zeros((len(p), 2))}, ("level", "of shape (729, 2)")),
     ],
 )
-def test_what_cannot_be_worked_with_is_named(change: dict[str, object], parts: tuple[str, ...]) -> None:
+def test_invalid_arguments_are_named(change: dict[str, object], parts: tuple[str, ...]) -> None:
     given: dict[str, object] = {"level": SETS["ball"][0], "low": LOW, "high": HIGH, "cells": 8, **change}
     with refused(*parts):
         boundary(**given)  # type: ignore[arg-type]
 
 
-def test_of_two_pieces_in_one_cell_the_nearer_one_is_meant() -> None:
-    def level(p: np.ndarray) -> np.ndarray:  # at two opposite corners of the one cell
+def test_of_two_pieces_in_one_cell_the_nearer_one_is_chosen() -> None:
+    def level(p: np.ndarray) -> np.ndarray:  # at two opposite corners of the only cell
         return np.where(np.abs(p.sum(axis=1)) > 2.0, 1.0, -1.0)
 
     found = boundary(level, LOW, HIGH, cells=(1, 1, 1), refine=False)

@@ -1,4 +1,4 @@
-"""The bracket's two proofs against the verdicts of the inverse, which decides on the cables' exact curves."""
+"""Both proofs of the bracket compared with verdicts of the inverse, which uses the exact curves of the cables."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tests.workspaces.all_facets import all_facets, crafted, mean_arm, no_load, 
 from tests.workspaces.test_margin import poses_of
 
 Status = sl.MarginStatus
-NEAR = 1e-4  # of the bracket's width, that loads are put beyond its ends
+NEAR = 1e-4  # of the width of the bracket, distance of the loads beyond its ends
 
 
 def contradictions(name: str, count: int, rng: np.random.Generator) -> tuple[int, int, int]:
-    """Of random poses of a robot under a random wrench: how many contradict the inverse, are open, and are outside."""
+    """Numbers of random poses with a random wrench that contradict the inverse, are open, and are outside."""
     robot = sl.load_robot(name)
     poses = poses_of(robot, count, rng)
     poses = poses[sl.margin(robot, poses).status != Status.NO_CHORD]
@@ -34,7 +34,7 @@ def contradictions(name: str, count: int, rng: np.random.Generator) -> tuple[int
     return int(wrong.sum()), int((found.status == Status.OPEN).sum()), int((found.status == Status.INFEASIBLE).sum())
 
 
-def test_poses_of_all_presets_get_the_verdict_of_the_inverse() -> None:
+def test_verdicts_of_all_presets_agree_with_the_inverse() -> None:
     rng = np.random.default_rng(21)
     total = np.sum([contradictions(name, 250, rng) for name in sl.robot_names()], axis=0)
     assert total[0] == 0
@@ -43,7 +43,7 @@ def test_poses_of_all_presets_get_the_verdict_of_the_inverse() -> None:
 
 
 @pytest.mark.soak
-def test_a_million_poses_of_all_presets_get_the_verdict_of_the_inverse() -> None:
+def test_a_million_verdicts_of_all_presets_agree_with_the_inverse() -> None:
     rng = np.random.default_rng(22)
     names = sl.robot_names()
     total = np.zeros(3, dtype=int)
@@ -55,7 +55,7 @@ def test_a_million_poses_of_all_presets_get_the_verdict_of_the_inverse() -> None
 
 
 def at_the_border(robots: int, rng: np.random.Generator) -> tuple[int, int, int]:
-    """Contradictions at loads just beyond both ends of the bracket, of ours and of one without interior extrema.
+    """Contradictions at loads just beyond both ends of the bracket, with and without interior extrema.
 
     And how often ours said feasible or infeasible there at all.
     """
@@ -89,7 +89,7 @@ def reach_of(wrench: Array, normals: Array) -> Array:
 
 
 @extended
-def test_hard_robots_at_the_border_contradict_only_a_bracket_from_the_ends_alone() -> None:
+def test_hard_robots_at_the_boundary_contradict_only_a_bracket_from_the_ends() -> None:
     ours, without, said = at_the_border(120, np.random.default_rng(23))
     assert ours == 0
     assert without > 0
@@ -97,7 +97,7 @@ def test_hard_robots_at_the_border_contradict_only_a_bracket_from_the_ends_alone
 
 
 @pytest.mark.soak
-def test_five_thousand_hard_robots_at_the_border() -> None:
+def test_five_thousand_hard_robots_at_the_boundary() -> None:
     ours, without, said = at_the_border(5000, np.random.default_rng(24))
     print(f"{ours} contradictions in {said} verdicts, and {without} without the interior extrema")
     assert ours == 0

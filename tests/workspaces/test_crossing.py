@@ -30,14 +30,14 @@ def test_curved_functions_take_few_evaluations(power: float, root: float) -> Non
     assert len(counted.positions) < 22 * LINES
 
 
-def test_jumps_and_infinite_ends_take_as_many_as_halving() -> None:
+def test_jumps_and_infinite_ends_take_as_many_evaluations_as_bisection() -> None:
     for low, high in ((1.0, -1.0), (1e-6, -1e6), (np.inf, -np.inf), (np.inf, -1.0), (0.5, -np.inf)):
         counted = Counted(jump(low, high))
         given = lines(counted.level)
         share = crossings(counted, *given)
         assert_allclose(share * given[1][:, 0], 0.7, rtol=1e-11)
         assert (share * given[1][:, 0] <= 0.7).all()
-        assert len(counted.asked) < 64  # 40 by halving alone
+        assert len(counted.asked) < 64  # 40 by bisection alone
 
 
 def test_an_end_that_is_zero_is_the_crossing() -> None:
@@ -46,7 +46,7 @@ def test_an_end_that_is_zero_is_the_crossing() -> None:
     assert not counted.asked
 
 
-def test_brackets_are_found_to_either_side_and_within_their_limits() -> None:
+def test_brackets_are_found_on_both_sides_within_their_limits() -> None:
     x = np.array([-0.5, 0.5, 0.9, -0.9])  # inside below zero
     points, outward = np.zeros((2, 4, 3))
     points[:, 0], outward[:, 0] = x, 1.0
@@ -61,6 +61,6 @@ def test_brackets_are_found_to_either_side_and_within_their_limits() -> None:
     assert np.abs(counted.positions[:, 0]).max() <= 0.9
 
 
-def test_way_to_the_box() -> None:
+def test_distance_to_the_box() -> None:
     directions = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.6, 0.8]])
     assert_allclose(distance_to_box(np.array([0.5, 0.0, 0.0]), directions, -np.ones(3), np.ones(3)), [0.5, 1.0, 1.25])

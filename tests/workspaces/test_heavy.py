@@ -1,4 +1,4 @@
-"""Workspaces of robots with heavy cables against the verdicts of the inverse."""
+"""Workspaces of robots with heavy cables compared with verdicts of the inverse."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ THREE = dict(three_robots())
 
 
 def check(name: str, robot: sl.Robot, count: int, cells: int) -> None:
-    """Within the error bar, right beside the boundary, and rarely open."""
+    """Within the error bar, also close to the boundary, and rarely open."""
     found = compared(robot, count, cells, np.random.default_rng(41))
     print(f"{name}: {found.space.volume:.1f} ± {found.space.volume_error:.1f}, {found.volume:.1f} m3, {found[3:]}")
     assert found.away <= 1.0
@@ -29,7 +29,7 @@ def test_hulls_with_heavy_cables(name: str) -> None:
 
 
 @pytest.mark.soak
-def test_hulls_of_random_robots_with_heavy_cables_against_a_million_verdicts() -> None:
+def test_hulls_of_random_robots_with_heavy_cables_agree_with_a_million_verdicts() -> None:
     for name, robot in (*three_robots(), *random_robots(20, 42)):
         check(name, robot, 1_000_000, 20)
 

@@ -47,12 +47,14 @@ def test_that_volume_and_its_error_bar_take_two_seconds() -> None:
 
 
 @extended
-def test_suspended_robot_of_the_article_in_its_frame_with_sag_and_without() -> None:
+def test_suspended_robot_of_the_article_with_and_without_sag() -> None:
     robot = sl.load_robot("article-suspended")
     low, high = [-7.5, -5.5, 0.0], [7.5, 5.5, 6.0]
     exact, straight = (boundary(level_of(robot, m), low, high, cells=16) for m in (sl.Catenary(), sl.Straight()))
     assert exact.volume == pytest.approx(789.4, abs=1.0)
-    assert exact.volume / straight.volume == pytest.approx(1.008, abs=0.001)  # the cables' weight tightens
+    assert exact.volume / straight.volume == pytest.approx(
+        1.008, abs=0.001
+    )  # the weight of the cables increases the tensions
     for found in (exact, straight):
         assert found.open_faces == ("z low",)
         assert found.components.count == 1
@@ -60,7 +62,7 @@ def test_suspended_robot_of_the_article_in_its_frame_with_sag_and_without() -> N
 
 
 @extended
-def test_a_millimeter_to_either_side_of_the_boundary_the_inverse_says_what_it_should() -> None:
+def test_verdicts_of_the_inverse_change_within_a_millimeter_of_the_boundary() -> None:
     robot = sl.load_robot("article-suspended")
     found = boundary(level_of(robot, sl.Catenary()), [-7.5, -5.5, 0.0], [7.5, 5.5, 6.0], cells=12).surface
     corners = found.vertices[found.faces]
@@ -76,5 +78,5 @@ def test_a_millimeter_to_either_side_of_the_boundary_the_inverse_says_what_it_sh
         feasible = sl.inverse(robot, inside).feasible
         bracket = sl.margin(robot, inside)
         assert (bracket.value > 0.0).all()
-        assert (bracket.low[~feasible] < 0.0).all()  # in a suspended robot's bracket, sag decides
+        assert (bracket.low[~feasible] < 0.0).all()  # sag decides within the bracket of a suspended robot
         assert np.mean(~feasible) < open_at_most

@@ -1,4 +1,4 @@
-"""Margins against all facets one by one, linear programs, single loads, and the verdicts of the inverse."""
+"""Margins compared with all facets, linear programs, single loads, and verdicts of the inverse."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ LEVEL = np.eye(3)
 SUSPENDED = sl.load_robot("article-suspended")
 IPANEMA = sl.load_robot("ipanema-1")
 Status = sl.MarginStatus
-WIDER = 2.0  # the bounds of the sag forces off their secants may be wider than the exact ones, relative to these
+WIDER = 2.0  # the bounds of differences from secants may be wider than the exact ones, relative to these
 
 
 def poses_of(robot: sl.Robot, count: int, rng: np.random.Generator) -> sl.Pose:
-    """In and around the middle of the frame, tilted a little where the platform may."""
+    """Poses in and around the middle of the frame, slightly tilted if the platform can rotate."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     if robot.test_box is not None:
         low, high = robot.test_box.low, robot.test_box.high
@@ -49,7 +49,7 @@ def rows_of(poses: sl.Pose) -> Array:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 @pytest.mark.parametrize("model", wide([sl.Catenary(), sl.Straight(), sl.Parabolic()]))
-def test_it_is_the_least_of_all_facets(pattern: str, model: sl.CableModel) -> None:
+def test_the_margin_is_the_least_of_all_facets(pattern: str, model: sl.CableModel) -> None:
     rng = np.random.default_rng(3)
     settled = 0
     for extra in (0, 1, 2, 4):
@@ -82,7 +82,7 @@ def test_twelve_and_sixteen_cables() -> None:
 
 
 @pytest.mark.parametrize("model", [sl.Straight(), sl.Parabolic()])
-def test_without_a_lever_arm_it_is_the_capacity_margin(model: sl.CableModel) -> None:
+def test_without_a_lever_arm_the_margin_is_the_capacity_margin(model: sl.CableModel) -> None:
     for robot in (SUSPENDED, IPANEMA, sl.load_robot("falcon-7")):
         poses = poses_of(robot, 400, np.random.default_rng(5))
         known = sl.capacity_margin(sl.inverse(robot, poses, model=model).state)
@@ -94,7 +94,7 @@ def test_without_a_lever_arm_it_is_the_capacity_margin(model: sl.CableModel) -> 
         np.testing.assert_array_equal(found.low, found.high)
 
 
-def test_a_linear_program_reaches_as_far_along_the_normal_and_no_less_elsewhere() -> None:
+def test_linear_programs_agree_along_the_normal_and_are_larger_elsewhere() -> None:
     rng = np.random.default_rng(6)
     poses = poses_of(IPANEMA, 12, rng)
     arm = mean_arm(IPANEMA)
@@ -117,7 +117,7 @@ def test_a_linear_program_reaches_as_far_along_the_normal_and_no_less_elsewhere(
 
 
 def _reach(matrix: Array, wrench: Array, way: Array) -> float:
-    """How far along a way the cables follow a wrench, by a linear program; NaN where not even to its beginning."""
+    """Largest multiple of a wrench that the cables supply, by a linear program; NaN if its start is infeasible."""
     needed = np.array([0.0, 0.0, IPANEMA.mass * IPANEMA.gravity, 0.0, 0.0, 0.0]) - wrench
     limits = [*zip(IPANEMA.tension_min, IPANEMA.tension_max, strict=True), (0.0, None if way.any() else 0.0)]
     cost = np.append(np.zeros(matrix.shape[1]), -1.0)
@@ -125,7 +125,7 @@ def _reach(matrix: Array, wrench: Array, way: Array) -> float:
     return float(solved.x[-1]) if solved.success else float("nan")
 
 
-def test_a_box_at_once_is_its_corners_one_by_one() -> None:
+def test_the_margin_of_a_box_is_that_of_its_corners() -> None:
     poses = poses_of(SUSPENDED, 300, np.random.default_rng(7))
     corners = np.array(list(product((-1, 1), repeat=6))) * ([100.0] * 3 + [20.0] * 3)
     box = sl.margin(SUSPENDED, poses, sl.WrenchBox(force=100.0, moment=20.0))
@@ -137,7 +137,7 @@ def test_a_box_at_once_is_its_corners_one_by_one() -> None:
         np.testing.assert_allclose(getattr(box, name), getattr(together, name), rtol=0.0, atol=1e-12)
 
 
-def test_a_sum_of_sets_is_every_sum_of_their_wrenches() -> None:
+def test_the_margin_of_a_sum_of_sets_is_that_of_all_sums() -> None:
     rng = np.random.default_rng(8)
     poses = poses_of(SUSPENDED, 20, rng)
     first, second = rng.normal(size=(5, 6)), rng.normal(size=(4, 6)) * 3.0
@@ -147,7 +147,7 @@ def test_a_sum_of_sets_is_every_sum_of_their_wrenches() -> None:
         SUSPENDED, poses, sl.WrenchPolytope(first) + sl.WrenchPolytope(second) + sl.WrenchBox(0, 0, center)
     )
     np.testing.assert_allclose(found.value, sl.margin(SUSPENDED, poses, sl.WrenchPolytope(sums)).value, atol=1e-11)
-    # an ellipsoid's support is that of its point farthest against the normal found
+    # the support of an ellipsoid is at its extreme point against the normal
     round_ = sl.margin(SUSPENDED, poses, sl.WrenchEllipsoid(matrix=matrix, center=center))
     for k, pose in enumerate(poses):
         ahead = matrix.T @ round_.direction[k]
@@ -156,7 +156,7 @@ def test_a_sum_of_sets_is_every_sum_of_their_wrenches() -> None:
         assert float(alone.value) == pytest.approx(round_.value[k], abs=1e-10)
 
 
-def test_accelerations_are_loads_of_mass_and_turned_inertia() -> None:
+def test_accelerations_are_loads_of_mass_and_rotated_inertia() -> None:
     rng = np.random.default_rng(9)
     turned = np.array([[2.0, 0.3, 0.1], [0.3, 3.0, -0.2], [0.1, -0.2, 2.5]])
     robots = [SUSPENDED.replace(mass=mass, inertia=turned * mass / 100.0) for mass in (80.0, 160.0, 240.0)]
@@ -185,7 +185,7 @@ def test_less_load_leaves_more_margin() -> None:
 
 
 @pytest.mark.parametrize("model", [sl.Parabolic(), sl.Catenary()])
-def test_a_force_of_the_margin_against_the_normal_stands_at_the_border(model: sl.CableModel) -> None:
+def test_a_force_of_the_margin_is_at_the_boundary(model: sl.CableModel) -> None:
     poses = poses_of(SUSPENDED, 50, np.random.default_rng(11))
     found = sl.margin(SUSPENDED, poses, moment_arm=0.7, model=model)
     for k, pose in enumerate(poses):
@@ -209,7 +209,7 @@ def test_a_mirrored_robot_at_the_mirrored_pose_has_the_same_margin() -> None:
         np.testing.assert_allclose(getattr(here, name), getattr(there, name), rtol=1e-9)
 
 
-def test_it_comes_to_that_of_straight_cables_as_they_lose_their_weight() -> None:
+def test_the_margin_converges_to_that_of_straight_cables() -> None:
     poses = poses_of(SUSPENDED, 60, np.random.default_rng(13))
     straight = sl.margin(SUSPENDED, poses, model=sl.Straight()).value
     off = []
@@ -223,8 +223,8 @@ def test_it_comes_to_that_of_straight_cables_as_they_lose_their_weight() -> None
     assert off[1] == pytest.approx(10 * off[2], rel=0.1)
 
 
-def test_what_a_moment_alone_makes_fail_is_said_and_no_absurd_number() -> None:
-    # at the level middle a symmetric robot's cables resist moments about z, but no 50 N m
+def test_infeasibility_by_a_moment_alone_is_stated() -> None:
+    # in the middle, the cables of a symmetric robot resist moments about z, but not 50 N m
     middle = sl.Pose(0.5 * (IPANEMA.frame_anchors.min(axis=0) + IPANEMA.frame_anchors.max(axis=0)), LEVEL)
     twist = sl.WrenchPolytope([[0, 0, 0, 0, 0, 5000.0]])
     found = sl.margin(IPANEMA, middle, twist, model=sl.Straight())
@@ -232,8 +232,8 @@ def test_what_a_moment_alone_makes_fail_is_said_and_no_absurd_number() -> None:
     assert -5000.0 / mean_arm(IPANEMA) < float(found.value) < 0.0
 
 
-def test_a_normal_of_moments_alone_is_without_force_and_infinite_without_a_lever_arm() -> None:
-    # two cables at the center of mass of a beam, and one down from each end of it, 1 m away: 100 N m either way
+def test_a_normal_of_moments_has_no_force_margin() -> None:
+    # two cables at the center of mass of a beam, and one down from each end of it, 1 m away: 100 N m in both directions
     robot = sl.Robot(
         "beam",
         [[-4, 0, 3], [4, 0, 3], [1, 0, -5], [-1, 0, -5]],
@@ -255,13 +255,13 @@ def test_a_normal_of_moments_alone_is_without_force_and_infinite_without_a_lever
     assert np.linalg.norm(forces.direction[3:]) == pytest.approx(1.0)
 
 
-def test_poses_that_a_motion_pattern_does_not_join_are_refused() -> None:
+def test_poses_that_no_motion_connects_are_refused() -> None:
     robot = crafted(np.random.default_rng(3), "1R2T")
     with refused("pose[1]", allowed="0 m, by motion_pattern 1R2T", kind=InvalidValueError):
         sl.margin(robot, sl.Pose([[0, 0, 0], [0, 1, 0]], np.eye(3)))
 
 
-def test_cables_without_limit() -> None:
+def test_cables_without_upper_limits() -> None:
     hanging = SUSPENDED.replace(tension_max=np.inf)
     poses = poses_of(SUSPENDED, 300, np.random.default_rng(14))
     found = sl.margin(hanging, poses)
@@ -270,7 +270,7 @@ def test_cables_without_limit() -> None:
     np.testing.assert_allclose(straight.value, limited.value, rtol=1e-6)
     assert (found.low <= found.value).all()
     assert (found.value <= found.high).all()
-    # cables on all sides of a point: nothing limits what they can bear
+    # cables on all sides of a point: all loads are feasible
     star = crafted(np.random.default_rng(1), "2T", 1).replace(
         frame_anchors=[[-3, 0, -2], [3, 0, -2], [0, 0, 4]], tension_max=np.inf, tension_min=0.0
     )
@@ -280,7 +280,7 @@ def test_cables_without_limit() -> None:
     assert free.limiting_cable == -1
 
 
-def test_singular_poses_and_ends_that_coincide_are_outside_and_say_why() -> None:
+def test_singular_poses_and_coincident_ends_are_outside_with_a_reason() -> None:
     crossed = IPANEMA.replace(platform_anchors=np.zeros((8, 3)))
     found = sl.margin(crossed, sl.Pose([0.1, 0.2, 0.3], LEVEL))
     assert (int(found.status), float(found.value), int(found.limiting_cable)) == (Status.SINGULAR, -np.inf, -1)
@@ -293,7 +293,7 @@ def test_singular_poses_and_ends_that_coincide_are_outside_and_say_why() -> None
     assert sl.margin(slack, sl.Pose([0, 0, 2], LEVEL)).status in (Status.TOO_SLACK, Status.INFEASIBLE)
 
 
-def test_limits_of_the_frame_end_become_those_of_the_chord() -> None:
+def test_frame_end_limits_are_converted_to_chord_limits() -> None:
     ends = SUSPENDED.replace(tension_limits_of="frame_end")
     poses = poses_of(SUSPENDED, 40, np.random.default_rng(15))
     found = sl.margin(ends, poses)
@@ -312,7 +312,7 @@ def test_limits_of_the_frame_end_become_those_of_the_chord() -> None:
         assert found.low[k] == pytest.approx(float(known.low), abs=1e-6)
 
 
-def test_many_robots_by_tables_are_the_same_as_objects() -> None:
+def test_many_robots_as_tables_agree_with_objects() -> None:
     rng = np.random.default_rng(16)
     poses = poses_of(SUSPENDED, 5, rng)
     table = np.repeat(cables_of(SUSPENDED)[None], 3, axis=0)
@@ -331,7 +331,7 @@ def test_many_robots_by_tables_are_the_same_as_objects() -> None:
         MarginRows(SUSPENDED, cables=table[:, :7])
 
 
-def test_a_result_keeps_its_shape_and_stays_as_it_is() -> None:
+def test_a_result_has_the_shape_of_the_poses_and_is_read_only() -> None:
     pose = sl.Pose([0, 0, 2], LEVEL)
     one, more = sl.margin(SUSPENDED, pose), sl.margin(SUSPENDED, sl.Pose([[0, 0, 2], [1, 0, 2]], LEVEL))
     assert (one.value.shape, one.direction.shape, more.value.shape) == ((), (6,), (2,))

@@ -1,4 +1,4 @@
-"""Outlines: their vertices are on the boundary by margins worked out another way, and what they hold can be held."""
+"""Outlines: vertices are on the boundary by independent margins, and positions inside are feasible."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from sagline.workspaces.wrench_sets import NO_LOAD
 from tests.tiers import extended, wide
 
 ROBOTS = ("cogiro", "falcon-7", "fast")
-SEEN = 5e-3  # of a cell of the grid: what a vertex may be beside the boundary
+SEEN = 5e-3  # of a cell of the grid: tolerance of a vertex
 
 
 def made(robot: sl.Robot, cells: int, wrenches: WrenchSet = NO_LOAD) -> tuple[Outline, Region]:
@@ -27,7 +27,7 @@ def outline_of(robot: sl.Robot, wrenches: WrenchSet, region: Region) -> Outline:
 
 
 def turns_around(surface: Surface, places: Array) -> Array:
-    """How many times a surface winds around positions: van Oosterom & Strackee 1983."""
+    """Winding number of a surface around positions: van Oosterom & Strackee 1983."""
     found = np.empty(len(places))
     for k, place in enumerate(places):
         a, b, c = (surface.vertices[surface.faces[:, i]] - place for i in range(3))
@@ -50,7 +50,7 @@ def test_vertices_are_where_the_verdict_of_the_inverse_changes(name: str) -> Non
         place = found.surface.vertices[k]
         around = place + SEEN * step * np.vstack((np.eye(3), -np.eye(3)))
         held = sl.inverse(robot, sl.Pose(around, np.eye(3))).feasible
-        assert held.any()  # the boundary is nearer than that
+        assert held.any()  # the boundary is closer
         assert not held.all()
     assert found.cable.max() < robot.cable_count
 
@@ -59,7 +59,7 @@ def test_vertices_are_where_the_verdict_of_the_inverse_changes(name: str) -> Non
     ("name", "count"),
     [("cogiro", 150), *(pytest.param(name, 600, marks=pytest.mark.soak) for name in sl.robot_names())],
 )
-def test_what_it_holds_can_be_held_and_nothing_else(name: str, count: int) -> None:
+def test_exactly_the_positions_inside_are_feasible(name: str, count: int) -> None:
     robot = sl.load_robot(name)
     found, region = made(robot, 30)
     places = np.random.default_rng(17).uniform(region.low, region.high, (count, 3))
@@ -71,27 +71,27 @@ def test_what_it_holds_can_be_held_and_nothing_else(name: str, count: int) -> No
     status = sl.margin(robot, sl.Pose(clear, np.stack([np.eye(3)] * len(clear)))).status
     sure = status != sl.MarginStatus.OPEN
     np.testing.assert_array_equal((turns > 0.5)[sure], (status == sl.MarginStatus.FEASIBLE)[sure])
-    there = status != sl.MarginStatus.NO_CHORD  # elsewhere nothing can be asked
+    there = status != sl.MarginStatus.NO_CHORD  # positions elsewhere cannot be evaluated
     plan = sl.inverse(robot, sl.Pose(clear[there], np.stack([np.eye(3)] * np.count_nonzero(there))))
-    assert np.mean(plan.feasible != (turns > 0.5)[there]) < 0.01  # what the cables' sag leaves open
+    assert np.mean(plan.feasible != (turns > 0.5)[there]) < 0.01  # positions that sag leaves open
 
 
 @extended
-def test_it_holds_and_is_limited_as_the_workspace_is() -> None:
+def test_the_outline_agrees_with_the_workspace() -> None:
     robot, loads = sl.load_robot("article-suspended"), sl.WrenchBox(force=30.0)
     found, region = made(robot, 16, loads)
     space = sl.workspace(robot, wrenches=loads, cells=16, refine=False)
-    assert found.volume == pytest.approx(space.volume, rel=0.03)  # without what bulges
+    assert found.volume == pytest.approx(space.volume, rel=0.03)  # without bulges beyond the box
     assert found.parts == space.components.count
     assert found.open_faces == space.open_faces
     shares = {limit.cable: limit.share for limit in space.limits}
     assert found.shares == pytest.approx(shares, abs=0.01)
     assert list(found.shares.values()) == sorted(found.shares.values(), reverse=True)
     smaller = region._replace(low=locked(region.low + 0.5))
-    assert "z low" not in outline_of(robot, loads, smaller).open_faces  # a face of its own box is none of the robot's
+    assert "z low" not in outline_of(robot, loads, smaller).open_faces  # a face of its own box has no limiting cable
 
 
-def test_an_empty_one_has_no_faces() -> None:
+def test_an_empty_outline_has_no_faces() -> None:
     found, _ = made(sl.load_robot("cogiro"), 6, sl.WrenchBox(force=1e6))
     assert found.surface.faces.shape == (0, 3)
     assert found.shares == {}

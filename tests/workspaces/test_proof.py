@@ -1,4 +1,4 @@
-"""Proofs for boxes of poses: against the exact inverse, against known volumes, and what is refused."""
+"""Proofs for boxes of poses compared with the exact inverse and known volumes; refusals."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_no_pose_contradicts_a_proof(name: str, model: sl.CableModel) -> None:
         ("cogiro", INFINITE),
     ],
 )
-def test_nor_with_other_limits(name: str, changes: dict[str, Any]) -> None:
+def test_no_pose_contradicts_a_proof_with_other_limits(name: str, changes: dict[str, Any]) -> None:
     robot = sl.load_robot(name).replace(**changes)
     inside, outside, wrong = contradictions(robot, 180, np.random.default_rng(15))
     assert wrong == 0
@@ -57,21 +57,21 @@ def test_nor_with_other_limits(name: str, changes: dict[str, Any]) -> None:
     ],
     ids=["box", "ellipsoid", "polytope", "accelerations"],
 )
-def test_nor_does_any_load_of_a_set(name: str, wrenches: sl.WrenchSet) -> None:
+def test_no_load_of_a_set_contradicts_a_proof(name: str, wrenches: sl.WrenchSet) -> None:
     inside, outside, wrong = contradictions(sl.load_robot(name), 180, np.random.default_rng(16), wrenches=wrenches)
     assert wrong == 0
     assert min(inside, outside) > 50
 
 
 @pytest.mark.parametrize("name", ["article-suspended", "ipanema-3"])
-def test_nor_any_orientation(name: str) -> None:
+def test_no_orientation_contradicts_a_proof(name: str) -> None:
     inside, outside, wrong = contradictions(sl.load_robot(name), 300, np.random.default_rng(17), turns=(0.02, 0.1, 0.2))
     assert wrong == 0
     assert min(inside, outside) > 50
 
 
 @pytest.mark.parametrize("turns", [(0.0,), (0.1, 0.2)], ids=["level", "turned"])
-def test_without_what_slopes_leave_out_there_are_contradictions(turns: tuple[float, ...]) -> None:
+def test_contradictions_appear_without_the_bound_of_second_order_terms(turns: tuple[float, ...]) -> None:
     rng = np.random.default_rng(5)
     robot = sl.load_robot("article-suspended")
     *_, wrong = contradictions(robot, 600, rng, turns=turns, precision=(0.0, 1e-12))
@@ -108,7 +108,7 @@ def test_small_boxes_are_proved_at_once() -> None:
     assert tilted.verdict == sl.ProofVerdict.PROVED_OUTSIDE
 
 
-def test_a_planar_platform_turns_in_its_plane_alone() -> None:
+def test_a_planar_platform_rotates_only_in_its_plane() -> None:
     corners = [[-0.3, 0, 0.2], [0.3, 0, 0.2], [0.3, 0, -0.2], [-0.3, 0, -0.2]]
     robot = sl.Robot(
         "plane",
@@ -133,8 +133,8 @@ def test_a_planar_platform_turns_in_its_plane_alone() -> None:
         sl.prove(robot.replace(motion_pattern="2T"), sl.PoseBox(middle, middle, tilt=0.1))
 
 
-def test_cables_may_be_stretched_to_more_than_twice_their_length() -> None:
-    # nobody's robots, but within their limits: the inverse finds tensions above EA
+def test_cables_stretched_to_more_than_twice_their_length() -> None:
+    # unrealistic robots within their limits: the inverse finds tensions above EA
     soft = sl.load_robot("ipanema-1").replace(cables=sl.Cable(0.0185, 36.8), tension_max=225.0)
     _, outside, wrong = contradictions(soft, 180, np.random.default_rng(18))
     assert wrong == 0
@@ -155,7 +155,7 @@ def test_the_budget_ends_in_open_cells(tilt: float) -> None:
     assert proof.open > 0.01
 
 
-def test_progress_is_told_and_may_interrupt() -> None:
+def test_progress_is_reported_and_can_interrupt() -> None:
     robot, box = sl.load_robot("cogiro"), sl.PoseBox([-8, -6, 0], [8, 6, 5])
     told: list[tuple[int, int]] = []
 
@@ -170,7 +170,7 @@ def test_progress_is_told_and_may_interrupt() -> None:
     assert all(done <= known for done, known in told)
 
 
-def test_what_proofs_do_not_know_is_refused() -> None:
+def test_unsupported_options_are_refused() -> None:
     robot, box = sl.load_robot("article-suspended"), sl.PoseBox([0, 0, 2], [1, 1, 3], tilt=0.1)
     with refused("ipanema-2-pulleys: pulley_radius[0]", "0.25 m", kind=sl.InvalidValueError):
         sl.prove(sl.load_robot("ipanema-2-pulleys"), box)

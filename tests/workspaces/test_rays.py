@@ -13,7 +13,7 @@ LOW, HIGH = [-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]
 
 
 @pytest.mark.parametrize("divisions", [0, 1, 5])
-def test_directions_are_those_of_an_octahedron_divided(divisions: int) -> None:
+def test_directions_are_those_of_a_divided_octahedron(divisions: int) -> None:
     steps, faces = generations(divisions)
     directions = np.concatenate([new for new, _ in steps])
     assert len(directions) == 4 * 4**divisions + 2
@@ -46,7 +46,7 @@ def test_rays_end_at_the_box() -> None:
     assert_allclose(np.abs(found.vertices).max(axis=1), 1.0, rtol=1e-14)
 
 
-def test_a_wall_is_seen_by_the_boundary_and_not_by_rays() -> None:
+def test_a_wall_is_found_by_the_boundary_and_missed_by_rays() -> None:
     wall = both([brick([0.0, 0.0, 0.0], [0.8, 0.6, 0.7]), outside(brick([0.21, 0.0, 0.0], [0.05, 9.0, 9.0]))])
     hull = ray_hull(wall, [-0.3, 0.0, 0.0], LOW, HIGH, divisions=4)
     whole = 8.0 * 0.75 * 0.6 * 0.7
@@ -81,8 +81,8 @@ def test_facet_by_facet_finds_the_same_hull() -> None:
     assert sum(whole) < 4.0 * 4098
 
 
-def test_rays_from_outside_inward_pass_nothing_over() -> None:
-    # a hollow behind the first wall: rays from within may stop at either of its sides, those from outside at the last
+def test_rays_from_outside_find_the_last_sign_change() -> None:
+    # a hollow behind the first wall: rays from inside stop at either side, rays from outside at the last one
     shell = both([ball([0.0, 0.0, 0.0], 0.8), outside(ball([0.5, 0.0, 0.0], 0.1))])
 
     def facets(positions: Array) -> tuple[Array, Array]:

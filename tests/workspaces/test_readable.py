@@ -1,4 +1,4 @@
-"""What a prompt shows of the results about workspaces: a line, whatever their arrays hold."""
+"""Interactive sessions show each result on workspaces in one line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def robot() -> sl.Robot:
     return sl.load_robot("article-suspended")
 
 
-def test_a_prompt_shows_each_result_in_a_line(robot: sl.Robot) -> None:
+def test_each_result_is_shown_in_a_line(robot: sl.Robot) -> None:
     loads = sl.WrenchBox(force=100.0, moment=20.0)
     space = sl.workspace(robot, BOX, loads, cells=4)
     empty = sl.workspace(robot, BOX, sl.WrenchBox(1e5), cells=4)
@@ -38,7 +38,7 @@ def test_a_prompt_shows_each_result_in_a_line(robot: sl.Robot) -> None:
 
 
 @extended
-def test_a_prompt_shows_a_proof_in_a_line(robot: sl.Robot) -> None:
+def test_a_proof_is_shown_in_a_line(robot: sl.Robot) -> None:
     assert_in_a_line(sl.prove(robot, BOX, sl.WrenchBox(force=100.0, moment=20.0), budget=0.1))
 
 
@@ -72,24 +72,24 @@ def test_margins_are_counted_by_their_status(robot: sl.Robot) -> None:
     assert str(sl.margin(robot, at_anchor)).startswith("−inf N: NO_CHORD")
 
 
-def test_a_sweep_tells_how_far_it_is(robot: sl.Robot, tmp_path: Path) -> None:
+def test_a_sweep_shows_its_progress(robot: sl.Robot, tmp_path: Path) -> None:
     found = sl.sweep.run(sl.sweep.Request(robot, POSE), tmp_path / "sweep", workers=1)
     feasible = int(sl.inverse(robot, POSE).feasible.sum())
     numbers = [int(number) for number in re.findall(r"\d+", str(found))]
-    assert numbers[:6] == [1, 3, 1, 1, 1, feasible]  # robots, poses, wrenches; tasks done, of how many; feasible
+    assert numbers[:6] == [1, 3, 1, 1, 1, feasible]  # robots, poses, wrenches; finished tasks of all; feasible
 
 
-def test_a_box_that_is_all_inside_has_its_volume_without_zeros(robot: sl.Robot) -> None:
+def test_the_volume_of_a_box_inside_has_no_trailing_zeros(robot: sl.Robot) -> None:
     assert str(sl.workspace(robot, BOX, cells=4)).splitlines()[0].endswith(": 16 ± 0 m³")
 
 
 @extended
-def test_the_time_for_a_proof_begins_when_its_kernel_stands(robot: sl.Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_limit_of_a_proof_excludes_loading(robot: sl.Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
     real = Prover.verdicts
 
     def slow(self: Prover, *given: object) -> object:
-        clock[0] += 10.0 if clock[0] == 0.0 else 1e-3  # the first call loads
+        clock[0] += 10.0 if clock[0] == 0.0 else 1e-3  # the first call loads the kernel
         return real(self, *given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Prover, "verdicts", slow)

@@ -1,4 +1,4 @@
-"""Planes through a space, and what a function of positions is on them."""
+"""Planes through a space, and values of a function of positions on them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def places(positions: Array) -> Details:
 
 
 @pytest.mark.parametrize("normal", [0, 1, 2])
-def test_every_point_of_a_slice_is_where_its_column_and_row_say(normal: int) -> None:
+def test_points_of_a_slice_are_at_their_columns_and_rows(normal: int) -> None:
     low, high = np.array([-1.0, -2.0, 0.0]), np.array([3.0, 2.0, 5.0])
     cut = slice_of(places, Plane(normal, 1.25), low, high, (5, 7))
     first, second = (axis for axis in range(3) if axis != normal)

@@ -1,4 +1,4 @@
-"""Parts of a workspace: joined by a walk, separated by a proof, or neither."""
+"""Parts of a workspace: connected by a walk, separated by a proof, or neither."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.workspaces.shapes import any_of, ball, brick
 LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
 
 
-def test_parts_on_a_grid_that_a_walk_joins_are_one() -> None:
+def test_parts_connected_by_a_walk_are_one() -> None:
     space = sl.workspace(sl.load_robot("expo2015-lucia"), cells=24)
     assert label(space.components.nodes >= 0)[1] == 3  # nodes of the grid connected along its edges
     assert space.components.count == 1
@@ -49,7 +49,7 @@ def test_walks_lead_through_parts_thinner_than_a_cell(kind: str, seed: int) -> N
         assert np.abs(walk).max() <= 1.0
 
 
-def test_gaps_are_not_joined() -> None:
+def test_gaps_are_not_connected() -> None:
     for gap, count in ((0.3, 2), (0.15, 2), (-0.02, 1)):
         level = any_of([ball([-0.4 - gap, 0.05, 0.0], 0.4), ball([0.4, -0.03, 0.07], 0.4)])
         grid = sample_grid(level, LOW, HIGH, (17, 17, 17))
@@ -83,7 +83,7 @@ def test_a_wall_separates_a_robots_workspace_and_a_low_wall_does_not() -> None:
     assert space.components.separate.tolist() == [True, True]
     assert " in 2 parts\n" in str(space)
     assert "proved" in str(space)
-    # without the wall around the platform, only cables can collide: this is no proof
+    # without the wall around the platform only cables can collide, which proves nothing
     exclude = exclusion(space.levels())
     assert exclude is not None
     half = np.array([0.05, 0.05, 0.05])
@@ -103,7 +103,7 @@ def test_the_margin_separates_parts_of_a_workspace() -> None:
     assert space.components.separate.all()
 
 
-def test_without_walk_and_proof_the_text_says_so() -> None:
+def test_the_text_states_missing_walks_and_proofs() -> None:
     load = sl.WrenchPolytope([[1680, -1860, 7210, 70, -630, -1350]])
     space = sl.workspace(sl.load_robot("expo2015-lucia-pulleys"), wrenches=load, cells=12)
     assert space.components.count == 2

@@ -17,7 +17,7 @@ WIDE = sl.PoseBox([-7.4, -5.4, 0.1], [7.4, 5.4, 5.9])
 
 
 def square(**changes: object) -> sl.Robot:
-    """Four cables to one point in an upright plane, from the corners of a square of 2 m."""
+    """Four cables to one point in a vertical plane, from the corners of a square of 2 m."""
     given = {
         "name": "square",
         "frame_anchors": [[0, 0.5, 0], [2, 0.5, 0], [2, 0.5, 2], [0, 0.5, 2]],
@@ -34,7 +34,7 @@ def square(**changes: object) -> sl.Robot:
 
 
 def normals_of(space: sl.Workspace) -> Array:
-    """Of the surface at its vertices, outward, of length 1."""
+    """Normals of the surface at its vertices, outward, of length 1."""
     corners = space.surface.vertices[space.surface.faces]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     found = np.zeros_like(space.surface.vertices)
@@ -71,7 +71,9 @@ def test_every_vertex_is_on_the_boundary(suspended: sl.Workspace) -> None:
 
 
 @pytest.mark.parametrize(("aside", "agreeing"), [(1e-4, 0.99), (1e-3, 1.0)])
-def test_a_millimeter_to_either_side_the_inverse_agrees(suspended: sl.Workspace, aside: float, agreeing: float) -> None:
+def test_verdicts_of_the_inverse_agree_a_millimeter_from_the_boundary(
+    suspended: sl.Workspace, aside: float, agreeing: float
+) -> None:
     faces = suspended.surface.faces
     by_box = np.unique(faces[(suspended.limiting[faces] == BY_BOX).any(axis=1)])
     free = np.setdiff1d(np.arange(len(suspended.surface.vertices)), by_box)
@@ -97,7 +99,7 @@ def test_two_mirrors_of_the_robot_are_mirrors_of_its_workspace(suspended: sl.Wor
 
 
 @extended
-def test_smaller_loads_make_larger_workspaces() -> None:
+def test_smaller_loads_give_larger_workspaces() -> None:
     sizes = (100.0, 50.0, 20.0, 0.0)
     spaces = [sl.workspace(SUSPENDED, None, sl.WrenchBox(size, 0.1 * size), cells=8) for size in sizes]
     for small, large in pairwise(spaces):
@@ -108,7 +110,7 @@ def test_smaller_loads_make_larger_workspaces() -> None:
 
 
 @extended
-def test_more_rotations_make_smaller_workspaces_and_any_of_them_larger() -> None:
+def test_all_rotations_give_smaller_workspaces_and_any_of_them_larger() -> None:
     turns = sl.Pose.from_euler(np.zeros(3), np.radians([0.0, 25.0, -25.0]), 0.0, 0.0).matrix
     level = sl.workspace(SUSPENDED, WIDE, cells=6)
     every, some = (
@@ -124,7 +126,7 @@ def test_more_rotations_make_smaller_workspaces_and_any_of_them_larger() -> None
     assert np.array_equal(tilted.level, sl.workspace(SUSPENDED, ROOM, orientations=sl.Tilts(0.2), cells=4).level)
 
 
-def test_of_several_orientations_the_worst_counts_or_the_best() -> None:
+def test_the_worst_or_the_best_orientation_is_used() -> None:
     turns = sl.Pose.from_euler(np.zeros(3), np.radians([0.0, 25.0, -25.0]), 0.0, 0.0).matrix
     places = np.random.default_rng(7).uniform(ROOM.low, ROOM.high, (50, 3))
     each = [sl.margin(SUSPENDED, sl.Pose(places, turn)).value for turn in turns]
@@ -142,13 +144,13 @@ def _nodes(space: sl.Workspace) -> Array:
 
 
 @extended
-def test_light_cables_have_the_workspace_of_straight_ones() -> None:
+def test_workspaces_of_light_and_straight_cables_agree() -> None:
     straight = sl.workspace(SUSPENDED, WIDE, model=sl.Straight(), cells=8).surface.volume
     differences = []
     for density in (0.067, 0.067e-2, 0.067e-4):
         cable = sl.Cable(density, SUSPENDED.cables.axial_stiffness[0])
         differences.append(sl.workspace(SUSPENDED.replace(cables=cable), WIDE, cells=8).surface.volume - straight)
-    assert differences[0] > 1.0  # sag adds to it: the cables' weight tightens
+    assert differences[0] > 1.0  # sag increases it: the weight of the cables adds tension
     assert abs(differences[1]) < 0.02 * differences[0]
     assert abs(differences[2]) < 0.0002 * differences[0]
 
@@ -169,7 +171,7 @@ def test_a_wall_cuts_the_workspace_in_two() -> None:
     assert space.limits[0].criterion == "clearance"
 
 
-def test_sag_is_that_of_the_deepest_cable_under_the_middle_load() -> None:
+def test_sag_is_the_largest_one_under_the_middle_load() -> None:
     corners = [[0, 0, -300, 0, 0, 0], [0, 0, -100, 0, 0, 0]]
     loads = sl.WrenchPolytope(corners) + sl.WrenchBox(20.0, 2.0, center=[50, 0, -200, 0, 0, 5])
     middle, limit = [50, 0, -400, 0, 0, 5], 0.3
@@ -184,7 +186,7 @@ def test_sag_is_that_of_the_deepest_cable_under_the_middle_load() -> None:
 
 
 def test_the_area_of_a_planar_robot() -> None:
-    # weightless and pulled by at least 1 N in four directions: everywhere inside the square, whatever the tensions
+    # weightless cables with at least 1 N in four directions: feasible everywhere inside the square
     space = sl.workspace(square(tension_min=1e-6), cells=32)
     assert space.unit == "m²"
     assert space.volume == pytest.approx(4.0, rel=2e-3)
@@ -221,7 +223,7 @@ def test_an_empty_workspace_names_the_nearest_pose_and_its_cables() -> None:
     assert near.reason.replace("\N{NO-BREAK SPACE}", " ") in " ".join(line.strip() for line in str(space).splitlines())
 
 
-def test_moments_that_alone_are_too_much_are_told() -> None:
+def test_infeasible_moments_are_reported() -> None:
     near = sl.workspace(SUSPENDED, ROOM, sl.WrenchBox(1.0, 1e5), cells=6).nearest
     assert near is not None
     assert "moments" in near.reason
@@ -247,7 +249,7 @@ def test_a_region_smaller_than_a_cell_is_found_by_the_search() -> None:
     assert "cell" in near.reason
 
 
-def test_nothing_limits_where_nothing_can_fail() -> None:
+def test_faces_without_a_limiting_cable() -> None:
     # a point pulled to all sides without upper limits, on straight cables, bears any load inside the square
     robot = square(tension_max=np.inf)
     found = sl.margin(robot, sl.Pose([1.0, 0.5, 1.0], np.eye(3)), model=sl.Straight())
@@ -291,13 +293,13 @@ BAD: dict[str, tuple[dict[str, object], dict[str, str]]] = {  # arguments, and p
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_is_refused(case: str) -> None:
+def test_refusals(case: str) -> None:
     given, parts = BAD[case]
     with refused(**parts, kind=sl.InvalidValueError):
         sl.workspace(SUSPENDED, **given)  # type: ignore[arg-type]
 
 
-def test_what_planar_robots_refuse() -> None:
+def test_refusals_of_planar_robots() -> None:
     with refused("box", "0.5 m thick along plane_normal, y", "0 m for a planar robot", kind=sl.InvalidValueError):
         sl.workspace(square(), sl.PoseBox([0, 0, 0], [2, 0.5, 2]))
     with refused("orientations: tilt", "5.73 deg", kind=sl.InvalidValueError):
@@ -306,12 +308,12 @@ def test_what_planar_robots_refuse() -> None:
         sl.workspace(square(plane_normal=[1, 1, 0], frame_anchors=[[0, 0, 0], [2, -2, 0], [2, -2, 2], [0, 0, 2]]))
 
 
-def test_any_method_will_do_where_no_criterion_looks_at_tensions() -> None:
+def test_any_method_is_valid_without_a_criterion_on_tensions() -> None:
     usual = sl.workspace(SUSPENDED, ROOM, cells=4)
     assert sl.workspace(SUSPENDED, ROOM, tension=sl.LowestSum(), cells=4).volume == usual.volume
 
 
-def test_progress_ends_with_all() -> None:
+def test_progress_ends_with_the_total() -> None:
     told: list[tuple[int, int]] = []
     sl.workspace(SUSPENDED, ROOM, cells=8, progress=lambda done, of: told.append((done, of)))
     done, of = np.array(told).T
@@ -319,7 +321,7 @@ def test_progress_ends_with_all() -> None:
     assert (done <= of).all()
 
 
-def test_the_field_is_that_of_single_poses() -> None:
+def test_the_field_agrees_with_single_poses() -> None:
     space = sl.workspace(SUSPENDED, ROOM, sl.WrenchBox(20.0, 2.0), cells=4)
     field = space.field
     assert dict(field.sizes) == {"x": 5, "y": len(space.y), "z": len(space.z)}
@@ -331,7 +333,7 @@ def test_the_field_is_that_of_single_poses() -> None:
     assert field.margin.attrs["units"] == "N"
 
 
-def test_it_reads_well_at_eighty_columns(suspended: sl.Workspace) -> None:
+def test_the_text_fits_eighty_columns(suspended: sl.Workspace) -> None:
     text = str(suspended)
     assert max(map(len, text.splitlines())) <= 80
     assert "789." in text

@@ -1,4 +1,4 @@
-"""Sets of loads: what they are made of, how they add, and what is refused."""
+"""Sets of loads: parts, sums, and refusals."""
 
 import copy
 import pickle
@@ -26,7 +26,7 @@ def test_adding_joins_the_parts() -> None:
         box + 1.0  # type: ignore[operator]
 
 
-def test_a_set_keeps_its_kind_where_it_is_copied_and_cannot_be_changed() -> None:
+def test_copies_of_a_set_have_its_type_and_are_read_only() -> None:
     box = sl.WrenchBox(force=3.0)
     for again in (pickle.loads(pickle.dumps(box)), copy.deepcopy(box)):
         assert type(again) is sl.WrenchBox
@@ -36,7 +36,7 @@ def test_a_set_keeps_its_kind_where_it_is_copied_and_cannot_be_changed() -> None
         box.center = np.zeros(6)  # type: ignore[misc]
 
 
-def test_no_load_is_the_one_point_zero() -> None:
+def test_no_load_is_the_point_zero() -> None:
     assert load_of(None) is NO_LOAD
     pose = sl.Pose([0, 0, 2], np.eye(3))
     robot = sl.load_robot("article-suspended")
@@ -44,7 +44,7 @@ def test_no_load_is_the_one_point_zero() -> None:
     assert values[0] == values[1] == values[2]
 
 
-def test_what_is_no_set_is_refused_by_name() -> None:
+def test_other_objects_are_refused_by_name() -> None:
     with refused("force", "-1 N", ">= 0 N, finite", kind=InvalidValueError):
         sl.WrenchBox(force=-1.0)
     with refused("moment", "of shape (2,)", kind=InvalidValueError):
