@@ -4,6 +4,7 @@ from .confirm import Confirmation as Confirmation
 from .confirm import confirm as confirm
 from .equilibria import Equilibria as Equilibria
 from .equilibria import equilibria as equilibria
+from .forward import MeasuredTension as MeasuredTension
 from .forward import forward as forward
 from .forward_rows import ForwardSolution as ForwardSolution
 from .forward_solver import ForwardSolver as ForwardSolver
@@ -12,7 +13,6 @@ from .home import home as home
 from .inverse import inverse as inverse
 from .inverse_solver import InverseSolver as InverseSolver
 from .inverse_solver import InverseStep as InverseStep
-from .measured import MeasuredTension as MeasuredTension
 from .plan import Gap as Gap
 from .plan import Plan as Plan
 from .polygon import tension_polygon as tension_polygon

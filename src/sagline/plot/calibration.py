@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -44,13 +44,8 @@ ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # [mm]
 
 
-class _Kind(NamedTuple):
-    """Residuals of one kind: axis label, values (N, c) in standard deviations, columns, and word for the outliers."""
-
-    label: str
-    values: Array
-    names: tuple[str, ...]
-    quantity: str
+# residuals of one kind: axis label, values (N, c) in standard deviations, names of the columns, word for the outliers
+_Kind: TypeAlias = "tuple[str, Array, tuple[str, ...], str]"
 
 
 def calibration(found: Calibration, part: str = "all", *, height: float | None = None) -> Figure:
@@ -81,24 +76,19 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
     instance(found, Calibration, "found")
     choice(part, "part", PARTS)
     place = None if height is None else number(height, "height", "m")
-    heights: dict[str, float] = {
-        "residuals": 0.5 + PANEL * (len(_kinds(found)) + 1),
-        "correlation": MATRIX,
-        "errors": _height_of_maps(found),
+    drawn: dict[str, tuple[float, Callable[[Any], None]]] = {
+        "residuals": (0.5 + PANEL * (len(_kinds(found)) + 1), lambda own: _residuals(own, found)),
+        "correlation": (MATRIX, lambda own: _correlation(own, found)),
+        "errors": (_height_of_maps(found), lambda own: _errors(own, found, place)),
     }
-    draw: dict[str, Callable[[Any], None]] = {
-        "residuals": lambda own: _residuals(own, found),
-        "correlation": lambda own: _correlation(own, found),
-        "errors": lambda own: _errors(own, found, place),
-    }
-    shown = [part] if part != "all" else list(draw)
-    height, look = sum(heights[name] for name in shown), current()
-    figure = sheet(height)
-    if look.height * height > SHRUNK * look.tallest:
-        figure.set_figheight(look.height * height)
-    own = figure.subfigures(len(shown), 1, height_ratios=[heights[name] for name in shown], squeeze=False)[:, 0]
-    for name, where in zip(shown, own, strict=True):
-        draw[name](where)
+    heights, draw = zip(*(drawn.values() if part == "all" else [drawn[part]]), strict=True)
+    look = current()
+    figure = sheet(sum(heights))
+    if look.height * sum(heights) > SHRUNK * look.tallest:
+        figure.set_figheight(look.height * sum(heights))
+    own = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for make, where in zip(draw, own, strict=True):
+        make(where)
     return figure
 
 
@@ -113,7 +103,7 @@ def _kinds(found: Calibration) -> list[_Kind]:
         ("rotations", sensors.rotation_deviation, slice(2 * m + 3, 2 * m + 6), axes, "rotation"),
     )
     return [
-        _Kind(label, found.residuals[:, where] / deviation, names, quantity)
+        (label, found.residuals[:, where] / deviation, names, quantity)
         for label, deviation, where, names, quantity in spans
         if deviation is not None and np.isfinite(found.residuals[:, where]).any()
     ]
@@ -126,26 +116,25 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
     held = np.isin(found.rows, [outlier.row for outlier in found.outliers])
     some = np.arange(len(found.rows))[:: -(-len(found.rows) // MOST_POSES)]
     shown = np.union1d(some, np.flatnonzero(held))
-    for ax, kind in zip(panels, kinds, strict=True):
+    for ax, (label, values, names, quantity) in zip(panels, kinds, strict=True):
         for size, density in BANDS:
             ax.axhspan(-size, size, color=GAP_COLOR, alpha=density, linewidth=0.0, zorder=0.4)
-        far = bool((np.abs(kind.values[shown]) > REACH).any())
-        for k, name in enumerate(kind.names):
-            values, color = kind.values[shown, k], COLORS[k % len(COLORS)]
-            within = np.where(np.abs(values) <= REACH, values, np.nan)
+        far = bool((np.abs(values[shown]) > REACH).any())
+        for k, (name, column) in enumerate(zip(names, values[shown].T, strict=True)):
+            within, color = np.where(np.abs(column) <= REACH, column, np.nan), COLORS[k % len(COLORS)]
             look = {"color": color, "linewidth": 0.0, "zorder": 2.0}
             mark = MARKS[k // len(COLORS) % len(MARKS)]
             ax.plot(found.rows[shown], within, mark, markersize=2.6, label=name, **look)
             for side, arrow in ((1.0, "^"), (-1.0, "v")):
-                beyond = side * values > REACH
+                beyond = side * column > REACH
                 ax.plot(found.rows[shown][beyond], np.full(beyond.sum(), side * REACH), arrow, markersize=4.0, **look)
-        _mark_outliers(ax, found, kind)
-        format_axes(ax, "", f"{kind.label} [$\\sigma$]")
+        _mark_outliers(ax, found, quantity)
+        format_axes(ax, "", f"{label} [$\\sigma$]")
         ax.grid(visible=False)
         if far:
             ax.set_ylim(-1.12 * REACH, 1.12 * REACH)
         else:
-            ax.set_ylim(*(np.array([-1.0, 1.0]) * max(2.5, 1.1 * float(np.nanmax(np.abs(kind.values[shown]))))))
+            ax.set_ylim(*(np.array([-1.0, 1.0]) * max(2.5, 1.1 * float(np.nanmax(np.abs(values[shown]))))))
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     every = f", every {-(-len(found.rows) // MOST_POSES)}th is drawn" if len(shown) < len(found.rows) else ""
     panels[-1].set_xlabel(f"row of the log{every}", fontsize=current().label)
@@ -154,11 +143,11 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
     set_heading(figure, f"{found.robot.name}: {chi_squared_text(found)}")
 
 
-def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
+def _mark_outliers(ax: Axes, found: Calibration, quantity: str) -> None:
     """Mark each outlier by a ring, and write its cable and its size."""
     named = 0
     for outlier in found.outliers:
-        if outlier.quantity != kind.quantity:
+        if outlier.quantity != quantity:
             continue
         place = float(np.clip(outlier.deviations * np.sign(outlier.size), -REACH, REACH))
         ax.plot(outlier.row, place, "o", markersize=8.0, markerfacecolor="none", markeredgecolor=VERMILLION, zorder=3.0)

@@ -54,23 +54,14 @@ class ForceBalance:
     def at(cls, robot: Robot, jet: Jet, plan: Plan) -> ForceBalance:
         """Force balance at the positions of `jet`. The plan is at rest at these positions."""
         nothing = np.zeros(plan.chord_tension.shape)
-        freedoms = robot.degrees_of_freedom
-        one = np.zeros((len(nothing), 1, freedoms))
-        new = cls(robot, jet, np.zeros((2, len(nothing), 6)), one, one, nothing[:, :freedoms], nothing, nothing)
-        return new.at_poses(jet).with_sag_of(plan, np.zeros((len(jet.pose), 2)))
+        standing = nothing[:, : robot.degrees_of_freedom]
+        new = cls(robot, jet, *_wrenches_and_normals(robot, jet), standing, nothing, nothing)
+        return new.with_sag_of(plan, np.zeros((len(jet.pose), 2)))
 
     def at_poses(self, jet: Jet) -> ForceBalance:
         """Force balance at the poses of `jet`, which are close to the present poses. The sag forces are unchanged."""
-        robot, (first, second, _) = self.robot, jet.rates
-        by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
-        by_speed = inertial_wrench(robot, jet.pose, first, second)
-        matrix = structure_matrix(robot, jet.pose)
-        normals = np.concatenate(list(_normals(matrix)))
-        gains = normals @ matrix
-        size = np.maximum(np.abs(gains).max(axis=-1, keepdims=True), _NOTHING)
-        gains[np.abs(gains) <= _NOTHING * size] = 0.0  # columns in the plane have no effect
-        wrenches = np.stack((by_rate, by_speed))
-        return replace(self, jet=jet, wrenches=wrenches, normals=normals / size, gains=gains / size)
+        wrenches, normals, gains = _wrenches_and_normals(self.robot, jet)
+        return replace(self, jet=jet, wrenches=wrenches, normals=normals, gains=gains)
 
     def wrench(self, motion: Array) -> Array:
         """Inertial wrench (K, 6) of `motion` (K, 2): accelerations and squared speeds."""
@@ -108,6 +99,19 @@ class ForceBalance:
         most = np.maximum(*ends).sum(axis=-1)
         along = np.einsum("krn,ckn->krc", self.normals, self.wrenches @ self.robot.freedom.T)
         return HalfPlanes(-along, most - np.einsum("krn,kn->kr", self.normals, self.standing))
+
+
+def _wrenches_and_normals(robot: Robot, jet: Jet) -> tuple[Array, Array, Array]:
+    """Inertial wrenches (2, K, 6), normals (K, R, n) of wrench bounds, and gains (K, R, m), as in `ForceBalance`."""
+    first, second, _ = jet.rates
+    by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
+    by_speed = inertial_wrench(robot, jet.pose, first, second)
+    matrix = structure_matrix(robot, jet.pose)
+    normals = np.concatenate(list(_normals(matrix)))
+    gains = normals @ matrix
+    size = np.maximum(np.abs(gains).max(axis=-1, keepdims=True), _NOTHING)
+    gains[np.abs(gains) <= _NOTHING * size] = 0.0  # columns in the plane have no effect
+    return np.stack((by_rate, by_speed)), normals / size, gains / size
 
 
 def _normals(matrix: Array) -> Iterator[Array]:
