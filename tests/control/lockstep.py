@@ -1,4 +1,4 @@
-"""Hand-made samples of the prototype on the lockstep clock: a good machine that moves, and what is done to it."""
+"""Artificial samples of the prototype on the lockstep clock: a faultless machine in motion, and modified samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What needs all groups is refused while one of them does not agree, in one line that names it and the next step."""
+"""Requests that need all groups are refused while a group disagrees, in one line with the group and the next step."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ MISHAPS = [
 
 
 @pytest.mark.parametrize(("mishap", "why"), MISHAPS)
-def test_what_is_not_mended_cannot_be_acknowledged(mishap: str, why: str) -> None:
+def test_a_lasting_disagreement_cannot_be_acknowledged(mishap: str, why: str) -> None:
     """It could be, and the next path moved the platform by 94 mm with six winches of eight."""
     control, machine = rig()
     machine.inject(mishap)
@@ -118,7 +118,7 @@ def test_nothing_moves_while_a_group_does_not_agree(begin: Callable[[Controller]
     assert state_of(control) is State.IDLE
 
 
-def test_drums_that_are_locked_are_let_go_before_it_connects() -> None:
+def test_locked_drums_are_released_before_connecting() -> None:
     control, machine = rig()
     machine.inject("cable 1 breaks")
     for _ in range(60):
@@ -140,7 +140,7 @@ def owners(machine: Machine) -> set[int]:
     return {report.owner for group in range(4) if (report := machine.report(group)) is not None}
 
 
-def test_who_is_refused_has_given_back_what_he_had() -> None:
+def test_a_refused_controller_has_released_its_grants() -> None:
     machine = Machine(prototype(), start=HOME, seed=1, faults=["group 2 is taken"])
     control = Controller(prototype(), machine.link(), seed=2)
     with pytest.raises(RefusedError, match=r"group 2: .*controller"):
@@ -148,7 +148,7 @@ def test_who_is_refused_has_given_back_what_he_had() -> None:
     assert control.owner not in owners(machine)
 
 
-def test_ctrl_c_while_it_connects_gives_back_what_it_had(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_during_connecting_releases_the_grants(monkeypatch: pytest.MonkeyPatch) -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         control, machine = rig(home=False)
@@ -171,7 +171,7 @@ def test_ctrl_c_while_it_connects_gives_back_what_it_had(monkeypatch: pytest.Mon
     assert control.owner not in owners(machine)
 
 
-def test_grants_are_claimed_only_while_it_connects() -> None:
+def test_grants_are_claimed_only_during_connecting() -> None:
     control, _ = rig()
     control.go_to(at(0.01, 0.0, 1.5))
     control.off()

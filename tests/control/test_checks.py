@@ -1,4 +1,4 @@
-"""What is checked of a path and a motion before the first set point goes out."""
+"""Checks of a path and a motion before the first set point is sent."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def planned(robot: sl.Robot, path: Path) -> object:
 
 
 @pytest.mark.parametrize("jump", [1e-3, 6e-3, None])
-def test_a_pose_that_jumps_while_its_twist_does_not_is_refused(jump: float | None) -> None:
+def test_a_jump_of_poses_without_a_twist_is_refused(jump: float | None) -> None:
     """6 mm between two ticks were 3.4 mm of cable, which no winch can do, and the twist knew nothing of it."""
     path = way()
     half = len(path.time) // 2
@@ -59,7 +59,7 @@ def test_a_pose_that_jumps_while_its_twist_does_not_is_refused(jump: float | Non
     assert state_of(control).name == "IDLE"
 
 
-def test_winches_that_a_jump_would_make_too_fast_are_named() -> None:
+def test_winches_that_are_too_fast_after_a_jump_are_named() -> None:
     robot = prototype()
     assert robot.winches is not None
     limit, winches = robot.winches.speed_limit, robot.winches
@@ -83,11 +83,11 @@ PATHS = [
 
 
 @pytest.mark.parametrize("path", PATHS)
-def test_paths_whose_twist_is_theirs_are_not_refused(path: object) -> None:
+def test_consistent_paths_are_accepted(path: object) -> None:
     planned(prototype(), path())  # type: ignore[operator]
 
 
-def test_the_load_counts_on_the_side_on_which_it_pulls() -> None:
+def test_the_load_of_a_motor_has_the_sign_of_the_tension() -> None:
     """A motor that takes cable in works against the cable: it needs force and tension together, not their difference.
 
     The limit is put between the two, so that a load of the other sign would let the path through, or refuse a second.

@@ -1,4 +1,4 @@
-"""Plans beside the cycles of a controller in real time: cycles go on, errors arrive, and Ctrl-C does not wait."""
+"""Plans beside the cycles of a controller in real time: cycles continue, errors are delivered, Ctrl-C does not wait."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Instant(Pace):
         return 0.0
 
 
-def test_a_plan_beside_the_cycles_is_the_one_without_them_and_the_cycles_go_on() -> None:
+def test_a_concurrent_plan_is_the_same_and_cycles_continue() -> None:
     watcher = Watcher()
     control, _ = rig(pace=Instant(), record=watcher)
     seen: list[int] = []
@@ -64,7 +64,7 @@ def test_ctrl_c_does_not_wait_for_a_plan() -> None:
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_a_result_that_nobody_waits_for_is_dropped(fails: bool) -> None:
+def test_an_abandoned_result_is_discarded(fails: bool) -> None:
     release = threading.Event()
 
     def work() -> None:

@@ -1,4 +1,4 @@
-"""The controller against a machine in the same process: what it does, what it refuses, what it sends."""
+"""The controller with a machine in the same process: motions, refusals and sent commands."""
 
 import gc
 import re
@@ -38,7 +38,7 @@ def sent(control: Controller) -> list[Command]:
     return [command for command in spy_of(control).commands if command is not None]
 
 
-def test_the_platform_goes_where_it_is_told() -> None:
+def test_the_platform_reaches_the_commanded_pose() -> None:
     control, machine = rig()
     done = control.go_to(at(0.1, -0.1, 1.45))
     assert done.status is ExecutionStatus.DONE
@@ -52,7 +52,7 @@ def test_the_platform_goes_where_it_is_told() -> None:
     assert done.clock[-1] == pytest.approx(done.plan.path.duration, abs=1e-12)  # type: ignore[union-attr]
 
 
-def test_recorded_samples_lead_to_the_same_commands_to_the_last_bit() -> None:
+def test_recorded_samples_give_the_same_commands_exactly() -> None:
     control, _ = rig(imperfect(zero=2e-3))
     control.go_to(at(0.05, 0.0, 1.5))
     control.jog(3, 2e-3)
@@ -73,7 +73,7 @@ def test_recorded_samples_lead_to_the_same_commands_to_the_last_bit() -> None:
     assert [event.text for event in again.events] == [event.text for event in control.events]
 
 
-def test_every_command_has_the_next_counter_and_set_points_that_a_winch_can_follow() -> None:
+def test_commands_have_consecutive_counters_and_feasible_set_points() -> None:
     control, _ = rig(imperfect(zero=2e-3))
     control.go_to(at(0.05, 0.0, 1.5))
     control.jog_platform([0.0, 0.01, 0.0, 0.0, 0.0, 0.02])
@@ -88,7 +88,7 @@ def test_every_command_has_the_next_counter_and_set_points_that_a_winch_can_foll
     assert all(np.isfinite(row).all() for command in followed for row in command[4:7])
 
 
-def test_nothing_is_followed_before_homing_and_the_ways_that_there_are_are_named() -> None:
+def test_no_path_is_followed_before_homing_and_valid_requests_are_named() -> None:
     control, _ = rig(home=False)
     with pytest.raises(RefusedError, match=r"OFF.*MOVING"):
         control.execute(sl.quintic_path([(0, 0, 1.5), (0, 0, 1.6)], speed=0.1))
@@ -120,7 +120,7 @@ REFUSED: list[tuple[Any, str]] = [
 
 
 @pytest.mark.parametrize(("path", "why"), REFUSED)
-def test_a_path_that_fails_a_check_is_refused_whole_in_one_line(path: Any, why: str) -> None:
+def test_a_path_that_fails_a_check_is_refused_in_one_line(path: Any, why: str) -> None:
     control, _ = rig()
     before = control.state, len(sent(control))
     with refused("the path", kind=RefusedError) as caught:
@@ -130,7 +130,7 @@ def test_a_path_that_fails_a_check_is_refused_whole_in_one_line(path: Any, why: 
     assert (control.state, len(sent(control))) == before
 
 
-def test_a_pause_keeps_the_way_and_resume_ends_where_the_path_ends() -> None:
+def test_a_pause_stays_on_the_path_and_resume_reaches_its_end() -> None:
     control, machine = rig()
     control.start(control.path_to(at(0.1, 0.0, 1.5)))
     for _ in range(60):
@@ -153,7 +153,7 @@ def test_a_pause_keeps_the_way_and_resume_ends_where_the_path_ends() -> None:
     assert np.abs(np.diff(followed, 2, axis=0)).max() < 3e-5  # no kink: 0.1 m/s to rest in 0.2 s is 5e-5 a cycle^2
 
 
-def test_a_stop_leads_all_rates_to_zero_together_and_a_new_path_goes_on_without_a_jump() -> None:
+def test_a_stop_is_synchronous_and_a_new_path_continues_without_a_jump() -> None:
     control, _ = rig()
     control.start(control.path_to(at(0.1, 0.1, 1.5)))
     for _ in range(80):
@@ -174,7 +174,7 @@ def test_a_stop_leads_all_rates_to_zero_together_and_a_new_path_goes_on_without_
     assert np.abs(np.diff(followed, 2, axis=0)).max() < 3e-5
 
 
-def test_an_emergency_stop_locks_the_drums_and_only_off_leads_on() -> None:
+def test_an_emergency_stop_locks_the_drums_until_off() -> None:
     control, machine = rig()
     control.start(control.path_to(at(0.1, 0.1, 1.5)))
     for _ in range(50):
@@ -196,7 +196,7 @@ def test_an_emergency_stop_locks_the_drums_and_only_off_leads_on() -> None:
         control.go_to(HOME)
 
 
-def test_after_a_fault_the_operator_acknowledges_and_the_place_is_still_known() -> None:
+def test_the_pose_is_still_known_after_a_fault_is_acknowledged() -> None:
     control, machine = rig()
     machine.inject(Injected("group is silent", 1, 0.0, 1.5, 0.3))
     done = control.go_to(at(0.1, 0.1, 1.5))
@@ -211,7 +211,7 @@ def test_after_a_fault_the_operator_acknowledges_and_the_place_is_still_known() 
     assert control.go_to(HOME).status is ExecutionStatus.DONE
 
 
-def test_a_second_controller_is_refused_and_the_first_goes_on() -> None:
+def test_a_second_controller_is_refused_and_the_first_continues() -> None:
     first, machine = rig()
     link = Spy(machine.link(moves=False))
     second = Controller(prototype(), link, seed=3)
@@ -233,7 +233,7 @@ def test_a_second_controller_is_refused_and_the_first_goes_on() -> None:
     assert state_of(second) is State.READY
 
 
-def test_of_two_that_each_have_some_groups_one_gets_all() -> None:
+def test_of_two_controllers_with_some_groups_one_gets_all() -> None:
     machine = Machine(prototype(), start=HOME, seed=1)
     links = machine.link(), machine.link(moves=False)
     both = [Controller(prototype(), link, seed=seed) for link, seed in zip(links, (3, 4), strict=True)]
@@ -251,7 +251,7 @@ def test_of_two_that_each_have_some_groups_one_gets_all() -> None:
     assert sorted(control.state is State.READY for control in both) == [False, True]
 
 
-def test_one_who_only_reads_sends_nothing_and_sees_where_the_platform_is() -> None:
+def test_a_reading_controller_sends_nothing_and_estimates_the_pose() -> None:
     control, machine = rig()
     watcher = Watcher()
     spy = Spy(machine.link(moves=False))
@@ -267,7 +267,7 @@ def test_one_who_only_reads_sends_nothing_and_sees_where_the_platform_is() -> No
         shadow.connect()
 
 
-def test_homing_names_a_jog_where_tensions_are_off_and_ends_where_they_agree() -> None:
+def test_homing_proposes_a_jog_until_tensions_agree() -> None:
     # what no motion of the platform eases
     tight = -6e-3 * sl.stiffness(sl.inverse(prototype(), HOME).state).null_lengths[:, 0]
     control, _ = rig(with_zero_errors(prototype(), tight), home=False)
@@ -298,7 +298,7 @@ def test_homing_names_a_jog_where_tensions_are_off_and_ends_where_they_agree() -
     assert control.zero == pytest.approx(tight, abs=2e-4)
 
 
-def test_a_jog_in_homing_ends_where_a_tension_passes_its_limit() -> None:
+def test_a_jog_during_homing_ends_at_a_tension_limit() -> None:
     control, _ = rig(home=False)
     control.connect()
     control.begin_homing(HOME)
@@ -311,7 +311,7 @@ def test_a_jog_in_homing_ends_where_a_tension_passes_its_limit() -> None:
     assert (control.sample.tension / planned).max() < 1.4  # it took the PLC's ramp to stand
 
 
-def test_a_jog_that_would_leave_the_limits_is_refused() -> None:
+def test_a_jog_beyond_the_limits_is_refused() -> None:
     control, _ = rig()
     control.jog(0, -0.05)
     with refused("a jog of winch 0 by -100 mm", kind=RefusedError) as caught:
@@ -324,7 +324,7 @@ def test_a_jog_that_would_leave_the_limits_is_refused() -> None:
     assert state_of(control) is State.IDLE
 
 
-def test_the_platform_is_jogged_along_a_line_and_turned() -> None:
+def test_the_platform_is_jogged_along_a_line_and_rotated() -> None:
     control, machine = rig()
     control.jog_platform([0.01, 0.0, 0.02, 0.0, 0.0, 0.03])
     assert state_of(control) is State.IDLE
@@ -334,7 +334,7 @@ def test_the_platform_is_jogged_along_a_line_and_turned() -> None:
     assert np.abs(control.estimate.quaternion - turned).max() < 1e-5
 
 
-def test_ctrl_c_stops_first_and_a_second_one_changes_nothing() -> None:
+def test_ctrl_c_stops_the_machine_and_a_second_one_has_no_effect() -> None:
     def press() -> None:
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
@@ -356,7 +356,7 @@ def test_ctrl_c_stops_first_and_a_second_one_changes_nothing() -> None:
     assert (control.execution.state == State.STOPPING).sum() in (20, 21)
 
 
-def test_no_garbage_is_collected_while_it_moves() -> None:
+def test_no_garbage_is_collected_during_a_motion() -> None:
     seen = []
     watcher = Watcher()
     control, _ = rig(record=watcher)
@@ -369,7 +369,7 @@ def test_no_garbage_is_collected_while_it_moves() -> None:
     assert gc.get_freeze_count() == 0
 
 
-def test_one_who_looks_on_is_told_of_the_plan_before_its_first_cycle_and_of_its_end_after_the_last() -> None:
+def test_observers_are_notified_before_the_first_cycle_and_after_the_last() -> None:
     watcher = Watcher()
     control, _ = rig(record=watcher)
     done = control.go_to(at(0.02, 0.0, 1.5))
@@ -380,7 +380,7 @@ def test_one_who_looks_on_is_told_of_the_plan_before_its_first_cycle_and_of_its_
     assert watcher.cycles[-1].state is State.IDLE
 
 
-def test_a_log_that_stops_is_an_event_and_the_motion_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_log_is_an_event_and_the_motion_continues(monkeypatch: pytest.MonkeyPatch) -> None:
     watcher = Watcher(30, lambda: setattr(Watcher, "stopped", "disk full"))
     monkeypatch.setattr(Watcher, "stopped", "")
     control, _ = rig(record=watcher)
@@ -439,7 +439,7 @@ def _short(machine: Machine) -> Any:
     return link
 
 
-def test_samples_of_an_execution_are_those_that_came() -> None:
+def test_samples_of_an_execution_are_the_received_ones() -> None:
     control, _ = rig(imperfect())
     done = control.go_to(at(0.02, 0.0, 1.5))
     answers = [answer for answer in spy_of(control).answers if isinstance(answer, Sample)][-len(done) :]

@@ -1,4 +1,4 @@
-"""What an execution did less what was planned, beside numbers worked out by hand."""
+"""Deviations of an execution from its plan compared with numbers by hand."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def test_the_planned_position_is_that_of_the_path_at_the_clock() -> None:
     assert np.allclose(planned_position(sl.control.Execution(**moved))[:, 1], between, rtol=0.0, atol=1e-15)
 
 
-def test_errors_are_measured_less_planned_and_nothing_beside_a_plan() -> None:
+def test_errors_are_measured_minus_planned_and_nan_without_a_plan() -> None:
     done, plan = execution(), plan_of()
     away = position_error(done)
     assert np.array_equal(np.isnan(away).any(axis=1), ~done.answered)
@@ -26,7 +26,7 @@ def test_errors_are_measured_less_planned_and_nothing_beside_a_plan() -> None:
     assert np.isnan(null_space_error(sl.control.Execution(**beside))).all()
 
 
-def test_a_constant_error_that_lengths_can_mend_is_seen_whole_and_a_wrench_not() -> None:
+def test_constant_errors_of_lengths_are_visible_and_wrench_errors_are_not() -> None:
     """With a filter of no time the error is what it is; six of the eight directions are a wrench."""
     done, plan = execution(), plan_of()
     row = null_space(plan.state[0])

@@ -1,4 +1,4 @@
-"""Every way out of a state that the table lists is gone once, with a machine."""
+"""Every transition of the table of states is executed once with a machine."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ TOURS: dict[str, Drive] = {
 }
 
 
-def test_every_exit_is_driven_and_no_other() -> None:
+def test_exactly_the_listed_transitions_occur() -> None:
     driven = set()
     for drive in TOURS.values():
         control, machine = rig()

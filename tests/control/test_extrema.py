@@ -1,4 +1,4 @@
-"""Ends of short arrays are what numpy says they are, with or without what is no number among them."""
+"""Extrema of short arrays agree with numpy, with and without NaN."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ODD = (np.nan, np.inf, -np.inf)
 
 
 @pytest.mark.parametrize("count", [1, 4, 8])
-def test_ends_are_those_of_numpy(count: int) -> None:
+def test_extrema_agree_with_numpy(count: int) -> None:
     random = np.random.default_rng(count)
     for _ in range(200):
         values = random.normal(0.0, 100.0, count)
@@ -22,14 +22,14 @@ def test_ends_are_those_of_numpy(count: int) -> None:
         assert finite(values) == bool(np.isfinite(values).all())
 
 
-def test_infinities_of_both_signs_are_the_ends_though_their_sum_is_no_number() -> None:
+def test_infinities_of_both_signs_are_the_extrema() -> None:
     values = np.array([1.0, np.inf, -np.inf, 2.0])
     assert extrema(values) == (-np.inf, np.inf)
     assert largest(values) == np.inf
     assert not finite(values)
 
 
-def test_values_stay_in_their_order() -> None:
+def test_the_order_of_values_is_kept() -> None:
     values = np.array([3.0, -7.0, 5.0])
     assert extrema(values) == (-7.0, 5.0)
     assert values.tolist() == [3.0, -7.0, 5.0]

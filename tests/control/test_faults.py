@@ -1,4 +1,4 @@
-"""Every rule for faults on hand-made samples, on the lockstep clock: when it tells, how soon, and when it must not."""
+"""All fault rules on artificial samples with the lockstep clock: detection, delay, and no false alarms."""
 
 from __future__ import annotations
 
@@ -292,7 +292,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_fault_is_told_once_in_time_and_alone(name: str) -> None:
+def test_a_fault_is_reported_once_in_time_and_alone(name: str) -> None:
     case = CASES[name]
     found = told(case.change, 145, seed=8)
     assert tuple(each.name for each in found) == case.names
@@ -351,7 +351,7 @@ QUIET = {
 
 
 @pytest.mark.parametrize("name", QUIET)
-def test_less_than_that_is_no_fault(name: str) -> None:
+def test_smaller_deviations_are_no_fault(name: str) -> None:
     assert told(QUIET[name], 145, seed=8) == []
 
 
@@ -364,14 +364,14 @@ def test_less_than_that_is_no_fault(name: str) -> None:
         pytest.param({"unsteady": True, "more_mass": 2.0, "delay": 2}, 84_000, marks=pytest.mark.soak),
     ],
 )
-def test_a_good_machine_is_left_alone(options: dict[str, Any], count: int) -> None:
+def test_a_faultless_machine_raises_no_fault(options: dict[str, Any], count: int) -> None:
     """Noise, bias, friction, lost blocks, a load that is another, commands on their way: 20 s, or 14 minutes."""
     assert told(None, count, seed=11, **options) == []
 
 
 @pytest.mark.parametrize("index", range(8))
 @pytest.mark.parametrize("error", wide([-25.0, 25.0]))
-def test_a_cell_that_is_off_is_named_whatever_the_load_weighs(index: int, error: float) -> None:
+def test_a_wrong_load_cell_is_named_for_any_load(index: int, error: float) -> None:
     found = told(cell(index, lambda k, t: t + error), 150, seed=index, more_mass=2.0)
     assert [each.name for each in found] == ["cell wrong"]
     told_error = re.match(rf"cell {index}\b\D*?(-?\d+) N", found[0].line)
@@ -380,7 +380,7 @@ def test_a_cell_that_is_off_is_named_whatever_the_load_weighs(index: int, error:
     assert found[0].cycle - START < 50
 
 
-def test_an_oscillation_is_no_wrong_cell_however_exact_the_cells_are() -> None:
+def test_an_oscillation_is_no_wrong_load_cell() -> None:
     """Sign changes of more than the width of the tolerance, from one cycle to the next."""
     names = []
     for offset in (0.0, 60.0):
@@ -395,7 +395,7 @@ def test_an_oscillation_is_no_wrong_cell_however_exact_the_cells_are() -> None:
     assert names == [set(), {"cell wrong"}]
 
 
-def test_a_cell_that_is_lost_at_rest_stops_nothing() -> None:
+def test_a_load_cell_lost_at_rest_does_not_stop_the_machine() -> None:
     def rests(k: int, cycle: Cycle) -> Cycle:
         assert cycle.command is None or k > 0
         still = None if cycle.command is None else cycle.command._replace(rate=np.zeros(8))
@@ -407,34 +407,34 @@ def test_a_cell_that_is_lost_at_rest_stops_nothing() -> None:
     assert "nan" not in found[0].line
 
 
-def test_two_cells_that_die_are_told_one_by_one_and_no_cable_is_slack() -> None:
+def test_two_failing_load_cells_are_reported_one_by_one_without_a_slack_cable() -> None:
     second = since(lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 2, 0.0)), START + 60)
     found = told(both(cell(5, lambda k, t: 0.0), second), 145)
     assert [each.name for each in found] == [DEAD_CELL] * 2
     assert [each.line[:6] for each in found] == ["cell 5", "cell 2"]
 
 
-def test_where_motors_tell_nothing_a_reading_of_zero_is_a_slack_cable() -> None:
+def test_without_motor_data_a_zero_reading_is_a_slack_cable() -> None:
     bare = ROBOT.replace(winches=None)
     found = told(cell(5, lambda k, t: 0.0), 150, robot=bare)
     assert [(each.name, each.cycle) for each in found] == [("slack", START + 2)]
 
 
-def test_a_cable_that_breaks_without_notice_to_the_others_is_slack_until_they_notice() -> None:
+def test_a_broken_cable_is_slack_until_the_others_react() -> None:
     found = told(broken(4, others=1.0), 145)
     assert [each.name for each in found] == ["slack", "cable broken"]
     assert found[0].cycle == START + 2
     assert found[1].cycle <= START + 7
 
 
-def test_where_the_lower_limit_is_zero_the_noise_of_the_cells_stands_in() -> None:
+def test_with_a_zero_lower_limit_the_noise_of_the_cells_is_used() -> None:
     free = ROBOT.replace(tension_min=0.0)
     found = told(cell(5, lambda k, t: 11.1, torque=0.0), 150, robot=free)
     assert [each.name for each in found] == ["slack"]
     assert told(cell(5, lambda k, t: 11.4, torque=0.0), 60, robot=free) == []
 
 
-def test_a_plan_that_lets_a_cable_hang_has_no_slack_cable() -> None:
+def test_a_planned_slack_cable_is_no_fault() -> None:
     def hangs(k: int, cycle: Cycle) -> Cycle:
         altered = with_sample(
             cycle, tension=one(cycle.sample.tension, 4, 3.0 + 0.01 * (k % 7)), torque=one(cycle.sample.torque, 4, 0.0)
@@ -444,7 +444,7 @@ def test_a_plan_that_lets_a_cable_hang_has_no_slack_cable() -> None:
     assert told(hangs, 145) == []
 
 
-def test_without_a_plan_tensions_are_held_against_nothing() -> None:
+def test_without_a_plan_tensions_are_not_compared() -> None:
     def homing(k: int, cycle: Cycle) -> Cycle:
         sample = with_sample(cycle, tension=np.random.default_rng(k).uniform(0.0, 300.0, 8))
         return sample._replace(tension=np.full(8, np.nan), gains=None)
@@ -452,7 +452,7 @@ def test_without_a_plan_tensions_are_held_against_nothing() -> None:
     assert told(homing, 145) == []
 
 
-def test_what_is_wrong_from_the_first_look_on_is_told_then() -> None:
+def test_a_fault_present_at_the_start_is_reported_at_once() -> None:
     """Rules begin to look when the connection has seen all groups agree, or the operator's word was taken for it."""
     left = field("fault", 1, GroupFault.HEARTBEAT, start=0, end=30)
     assert [(each.name, each.cycle) for each in told(left, 60)] == [(GROUP_ACTS, 0)]
@@ -460,7 +460,7 @@ def test_what_is_wrong_from_the_first_look_on_is_told_then() -> None:
     assert [(each.name, each.cycle) for each in taken] == [("owner lost", 1)]  # there is a command from then on
 
 
-def test_a_grant_that_was_given_back_is_not_lost() -> None:
+def test_a_released_grant_is_no_fault() -> None:
     def leaves(k: int, cycle: Cycle) -> Cycle:
         if k < START or cycle.command is None:
             return cycle
@@ -469,7 +469,7 @@ def test_a_grant_that_was_given_back_is_not_lost() -> None:
     assert told(leaves, 300) == []
 
 
-def test_drums_that_were_locked_by_us_are_no_fault() -> None:
+def test_drums_locked_by_the_controller_are_no_fault() -> None:
     def locks(k: int, cycle: Cycle) -> Cycle:
         if k < START or cycle.command is None:
             return cycle
@@ -481,7 +481,7 @@ def test_drums_that_were_locked_by_us_are_no_fault() -> None:
     assert told(locks, 300) == []
 
 
-def test_a_cell_that_does_not_change_at_rest_is_not_stuck() -> None:
+def test_a_constant_load_cell_at_rest_is_no_fault() -> None:
     def rests(k: int, cycle: Cycle) -> Cycle:
         if cycle.command is None:
             return cycle
@@ -493,7 +493,7 @@ def test_a_cell_that_does_not_change_at_rest_is_not_stuck() -> None:
     assert told(rests, 145) == []
 
 
-def test_a_set_point_that_is_on_its_way_is_no_following_error() -> None:
+def test_a_delayed_set_point_is_no_following_error() -> None:
     """At 0.37 m/s and five cycles of delay set points are 19 mm ahead of the drums."""
     ahead = [
         np.abs(cycle.command.length - cycle.sample.length).max()
@@ -505,17 +505,17 @@ def test_a_set_point_that_is_on_its_way_is_no_following_error() -> None:
     assert [each.name for each in told(lags(7, 0.05), 145, delay=5)] == ["following error"]
 
 
-def test_what_a_late_group_has_not_said_yet_is_no_command_it_has_not_taken() -> None:
+def test_a_late_group_has_no_rejected_command() -> None:
     assert [each.name for each in told(silent(1, 8), 145, delay=5)] == ["group stale"]
 
 
-def test_a_group_that_stops_by_itself_with_locked_drums_says_both(snapshot: Any) -> None:
+def test_a_group_that_stops_and_locks_its_drums_reports_both(snapshot: Any) -> None:
     locked = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
     found = told(both(field("status", 2, locked), field("fault", 2, GroupFault.FOLLOWING_ERROR)), 60)
     assert found[0].line == snapshot
 
 
-def test_a_discarded_block_is_told_with_the_reason_and_the_next_step_of_its_link() -> None:
+def test_a_discarded_block_is_reported_with_reason_and_next_step() -> None:
     def bad(reasons: tuple[Refusal | None, ...]) -> str:
         def change(k: int, cycle: Cycle) -> Cycle:
             counts = one(cycle.sample.discarded, 2, max(k - START, 0))
@@ -538,7 +538,7 @@ def test_two_bursts_of_bad_blocks_are_two_events() -> None:
     assert [each.cycle for each in found] == [START + 1, START + 151]
 
 
-def test_it_is_present_as_long_as_its_rule_holds_and_a_lasting_one_from_then_on() -> None:
+def test_a_fault_is_present_while_its_rule_holds_and_a_lasting_one_afterwards() -> None:
     rules = {rule.name: rule for rule in faults_of(ROBOT)}
     change, before, seen = both(silent(2, 5), cell(5, lambda k, t: 0.0)), None, []
     for k, good in enumerate(cycles(200, seed=8)):
@@ -553,7 +553,7 @@ def test_it_is_present_as_long_as_its_rule_holds_and_a_lasting_one_from_then_on(
     assert not next(rule for rule in faults_of(ROBOT) if rule.name == DEAD_CELL).present
 
 
-def test_nonsense_neither_raises_nor_warns() -> None:
+def test_invalid_samples_raise_no_exception_and_no_warning() -> None:
     rng = np.random.default_rng(6)
     strange = np.array([np.nan, np.inf, -np.inf, 1e300, -1e300, 0.0])
 
@@ -576,7 +576,7 @@ def test_nonsense_neither_raises_nor_warns() -> None:
 OF_OTHERS = ["controller dead", "foreign block", "second controller", "set point infeasible"]
 
 
-def test_the_table_has_every_rule_and_what_others_look_after() -> None:
+def test_the_table_has_all_faults() -> None:
     names = [row.name for row in FAULT_TABLE]
     assert len(set(names)) == len(names)
     assert [row.name for row in FAULT_TABLE if row.by == "the controller"] == [kind.name for kind in FAULTS]
@@ -586,7 +586,7 @@ def test_the_table_has_every_rule_and_what_others_look_after() -> None:
         assert one_row.rule != other.rule
 
 
-def test_rules_of_one_set_know_nothing_of_another() -> None:
+def test_sets_of_rules_are_independent() -> None:
     first, second = faults_of(ROBOT), faults_of(ROBOT)
     assert first[0].seen is first[-1].seen
     assert first[0].seen is not second[0].seen
@@ -596,7 +596,7 @@ def test_rules_of_one_set_know_nothing_of_another() -> None:
     assert OWNER == 4711
 
 
-def test_what_follows_from_a_stop_is_not_told_again_but_for_lengths_in_doubt() -> None:
+def test_consequences_of_a_stop_are_reported_only_for_doubtful_lengths() -> None:
     """A drive trips, its PLC says so; later another drum slips, and then its servo is at its limit."""
     late_jump = since(lambda k, cycle: with_sample(cycle, length=_added(cycle.sample.length, 1, 0.003)), START + 20)
     later = both(late_jump, field("state", 3, WinchState.SATURATED))
@@ -607,7 +607,7 @@ def test_what_follows_from_a_stop_is_not_told_again_but_for_lengths_in_doubt() -
     ]
 
 
-def test_several_groups_that_stop_at_once_are_one_event_and_once() -> None:
+def test_simultaneous_stops_of_groups_are_one_event() -> None:
     def stops(k: int, cycle: Cycle) -> Cycle:
         acting = k >= START and k % 12 < 6  # a command to hold clears it for a while
         return with_sample(cycle, fault=np.full(4, int(GroupFault.HEARTBEAT))) if acting else cycle
@@ -617,7 +617,7 @@ def test_several_groups_that_stop_at_once_are_one_event_and_once() -> None:
     assert re.match(r"group 0, 1, 2, 3\b.* 100 ms", found[0].line)
 
 
-def test_drums_that_are_stopped_dead_have_not_jumped() -> None:
+def test_a_sudden_stop_of_drums_is_no_jump() -> None:
     """Locked at 0.3 m/s: a length is 3 mm less than its rate promised."""
 
     def locked(k: int, cycle: Cycle) -> Cycle:
@@ -631,7 +631,7 @@ def test_drums_that_are_stopped_dead_have_not_jumped() -> None:
     assert "encoder jump" not in [each.name for each in told(locked, 320)]
 
 
-def test_a_rate_that_comes_from_the_encoder_itself_does_not_hide_its_jump() -> None:
+def test_a_jump_is_found_with_rates_from_the_same_encoder() -> None:
     """A PLC that takes the rate of a period from its counts says that the drum was fast."""
 
     def alter(k: int, cycle: Cycle) -> Cycle:
@@ -644,7 +644,7 @@ def test_a_rate_that_comes_from_the_encoder_itself_does_not_hide_its_jump() -> N
     assert [(each.name, each.cycle) for each in told(alter, 100)] == [("encoder jump", START)]
 
 
-def test_set_points_that_a_plc_does_not_follow_are_no_following_error() -> None:
+def test_set_points_ignored_by_a_plc_are_no_following_error() -> None:
     ramping = int(GroupStatus.READY | GroupStatus.RAMPING)
     found = told(both(lags(7, 0.05), field("status", 3, ramping)), 145)
     assert [each.name for each in found] == [NOT_FOLLOWING]
@@ -664,7 +664,7 @@ OF_TENSIONS = [
 
 @pytest.mark.parametrize("name", OF_TENSIONS)
 @pytest.mark.parametrize("reading", wide([np.nan, np.inf]))
-def test_a_cell_without_a_number_hides_nothing_of_the_others(name: str, reading: float) -> None:
+def test_a_nan_reading_does_not_hide_faults_of_others(name: str, reading: float) -> None:
     case, motor = CASES[name], course().tension[START][6] * -0.0015
 
     def dead(k: int, cycle: Cycle) -> Cycle:
@@ -678,7 +678,7 @@ def test_a_cell_without_a_number_hides_nothing_of_the_others(name: str, reading:
     assert case.cycles[0] <= found[-1].cycle - START - 10 <= case.cycles[1]
 
 
-def test_a_cell_without_a_number_hides_no_tight_cable_where_nothing_is_planned() -> None:
+def test_a_nan_reading_does_not_hide_a_high_tension_without_a_plan() -> None:
     def homing(k: int, cycle: Cycle) -> Cycle:
         tension = one(one(cycle.sample.tension, 6, np.nan), 3, 2100.0 if k >= START else 150.0 + k)
         altered = with_sample(cycle, tension=tension, torque=one(cycle.sample.torque, 3, -3.0))
@@ -688,7 +688,7 @@ def test_a_cell_without_a_number_hides_no_tight_cable_where_nothing_is_planned()
     assert [(each.name, each.cycle) for each in found] == [(DEAD_CELL, 0), ("over-tension", START)]
 
 
-def test_cells_that_are_not_believed_stand_for_what_is_planned_and_the_others_for_themselves() -> None:
+def test_untrusted_cells_are_replaced_by_planned_tensions() -> None:
     rules, change = faults_of(ROBOT), cell(6, lambda k, t: np.nan)
     for k, good in enumerate(cycles(START + 5)):
         cycle = change(k, good)
@@ -715,7 +715,7 @@ def stops_at(standing: int, reads_only: bool) -> Change:
 
 
 @pytest.mark.parametrize("reads_only", [False, True])
-def test_what_begins_or_is_left_when_the_winches_stand_is_told(reads_only: bool) -> None:
+def test_faults_at_the_end_of_a_stop_are_reported(reads_only: bool) -> None:
     """The ramp ends 20 cycles after a drive tripped, and 21 more the motion counts as stopped."""
     silent_group = silent(1, 10**6, START + 5)
     tight = since(
@@ -732,7 +732,7 @@ def test_what_begins_or_is_left_when_the_winches_stand_is_told(reads_only: bool)
     ]
 
 
-def test_a_group_that_is_late_again_and_again_is_told_once_a_second_and_counted() -> None:
+def test_a_repeatedly_late_group_is_reported_once_per_second_with_a_count() -> None:
     def late_often(k: int, cycle: Cycle) -> Cycle:
         late_now = k >= START and (k - START) % 10 < 4
         return with_sample(cycle, age=one(cycle.sample.age, 2, 0.034 if late_now else 0.004))
@@ -754,7 +754,7 @@ def test_a_group_that_is_late_again_and_again_is_told_once_a_second_and_counted(
         ("largest_correction", np.nan, "nan m"),
     ],
 )
-def test_what_rules_cannot_be_made_of_is_refused(name: str, value: Any, text: str | None) -> None:
+def test_invalid_arguments_of_rules_are_refused(name: str, value: Any, text: str | None) -> None:
     with refused(name, text, kind=sl.InvalidValueError) as caught:
         faults_of(ROBOT, **{name: value})
     assert name != "groups" or "0 to 7" in caught.value.allowed
@@ -762,7 +762,7 @@ def test_what_rules_cannot_be_made_of_is_refused(name: str, value: Any, text: st
         faults_of(None)  # type: ignore[arg-type]
 
 
-def test_what_cells_are_is_the_robots_word_unless_told() -> None:
+def test_precision_of_cells_is_that_of_the_robot_by_default() -> None:
     noisy = sl.load_robot("article-prototype")
     assert noisy.winches is not None
     noisy = noisy.replace(winches=noisy.winches.replace(load_cell_deviation=3.0, load_cell_bias=-4.0))
@@ -771,13 +771,13 @@ def test_what_cells_are_is_the_robots_word_unless_told() -> None:
     assert faults_of(noisy, cell_deviation=0.6, cell_bias=0.8)[0].seen.sigma == pytest.approx(1.0)
 
 
-def test_an_emergency_stop_that_a_plc_gives_as_its_fault_is_one_event() -> None:
+def test_an_emergency_stop_reported_as_a_fault_is_one_event() -> None:
     found = told(field("fault", 2, GroupFault.EMERGENCY_STOP), 100)
     assert [each.name for each in found] == ["emergency stop"]
     assert re.search(r"\bgroup 2\.", found[0].line)
 
 
-def test_a_drum_that_follows_a_step_of_its_rate_has_not_jumped() -> None:
+def test_a_step_of_the_rate_is_no_jump() -> None:
     def steps(k: int, cycle: Cycle) -> Cycle:
         if k < START or cycle.command is None:
             return cycle
@@ -791,7 +791,7 @@ def test_a_drum_that_follows_a_step_of_its_rate_has_not_jumped() -> None:
     assert told(steps, 100) == []
 
 
-def test_a_drive_that_may_not_move_does_not_lag() -> None:
+def test_a_disabled_drive_has_no_following_error() -> None:
     def disabled(k: int, cycle: Cycle) -> Cycle:
         if cycle.command is None:
             return cycle
@@ -800,7 +800,7 @@ def test_a_drive_that_may_not_move_does_not_lag() -> None:
     assert told(both(lags(7, 0.05), disabled), 145) == []
 
 
-def test_what_others_are_off_the_plan_is_not_learned_while_a_cable_is_slack() -> None:
+def test_the_load_estimate_is_kept_while_a_cable_is_slack() -> None:
     rules, before, learned = faults_of(ROBOT), None, []
     change = broken(4, others=2.0)
     for k, good in enumerate(cycles(START + 30, seed=8)):
@@ -813,7 +813,7 @@ def test_what_others_are_off_the_plan_is_not_learned_while_a_cable_is_slack() ->
     assert (learned[START - 1] != learned[START - 2]).all()
 
 
-def test_a_motor_that_may_hold_its_own_friction_alone_does_not_prove_a_cable_taut() -> None:
+def test_a_motor_torque_within_friction_does_not_prove_a_taut_cable() -> None:
     """26 N planned, nothing read, 20 N held, of which 15 N may be friction."""
 
     def doubtful(k: int, cycle: Cycle) -> Cycle:
@@ -827,7 +827,7 @@ def test_a_motor_that_may_hold_its_own_friction_alone_does_not_prove_a_cable_tau
     assert [each.name for each in told(doubtful, 60)] == ["slack"]
 
 
-def test_one_slack_sample_that_is_seen_again_and_again_is_one() -> None:
+def test_a_repeated_slack_sample_counts_once() -> None:
     once = since(
         lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 3, 2.0), torque=np.zeros(8)),
         end=START + 1,

@@ -1,4 +1,4 @@
-"""Faults that a machine in one process has, to the state that follows and the time it takes; controller and all."""
+"""Faults of a machine in one process with its controller: the resulting state and the delay."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def happens(what: str) -> tuple[list[tuple[str, float]], list[tuple[str, float]]
 
 
 @pytest.mark.parametrize("what", [*CASES, *(pytest.param(what, marks=pytest.mark.soak) for what in MORE)])
-def test_it_is_told_once_and_leads_to_its_state_in_time(what: str) -> None:
+def test_a_fault_is_reported_once_and_leads_to_its_state_in_time(what: str) -> None:
     told, state = (CASES | MORE)[what]
     faults, states = happens(what)
     assert [name for name, _ in faults] == [name for name, _ in told]
@@ -95,7 +95,7 @@ def test_it_is_told_once_and_leads_to_its_state_in_time(what: str) -> None:
 
 @extended
 @pytest.mark.parametrize("seed", range(2))
-def test_a_busy_computer_is_no_encoder_that_jumps(seed: int) -> None:
+def test_a_busy_computer_causes_no_encoder_fault(seed: int) -> None:
     """Drives catch up as fast as they can with what they were told late."""
     machine = sl.twin.Machine(PROTOTYPE, seed=seed)
     control = sl.control.Controller(PROTOTYPE, Busy(machine.link(), seed), seed=1)

@@ -1,4 +1,4 @@
-"""Faults that stay, on a machine in one process: the state that follows; to acknowledge them mends nothing."""
+"""Lasting faults of a machine in one process: the resulting state, which acknowledging does not end."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def cycles(control: Controller, count: int) -> None:
 
 
 @pytest.mark.parametrize("name", wide([*GOES_ON, *STOPPING], first=5))
-def test_it_leads_to_its_state_and_is_not_acknowledged_away(name: str) -> None:
+def test_a_lasting_fault_cannot_be_acknowledged(name: str) -> None:
     case, stage = (STOPPING | GOES_ON)[name], set_off()
     control, first = stage.control, len(stage.control.events)
     assert state_of(control) is State.MOVING
@@ -158,7 +158,7 @@ def test_a_correction_at_its_limit_stops_and_asks_for_homing() -> None:
 
 
 @extended  # test_controller.py has it with links of one machine
-def test_a_second_controller_is_refused_and_the_first_goes_on() -> None:
+def test_a_second_controller_is_refused_and_the_first_continues() -> None:
     stage = set_off()
     beside = stage.machine.link(moves=False)
 

@@ -15,7 +15,7 @@ def plan(duration: float = 2.2, rate: float = 100.0) -> sl.Plan:
     return sl.inverse(PROTOTYPE, path)
 
 
-def test_rows_are_those_of_the_plans_poses_half_a_second_apart_and_the_last() -> None:
+def test_rows_are_half_a_second_apart_with_the_last_pose() -> None:
     given = plan()
     gains = gains_along(given)
     assert gains is not None
@@ -27,7 +27,7 @@ def test_rows_are_those_of_the_plans_poses_half_a_second_apart_and_the_last() ->
             np.testing.assert_allclose(one, other, atol=1e-11)
 
 
-def test_the_nearest_row_is_taken_and_it_is_the_same_object_each_time() -> None:
+def test_the_nearest_row_is_returned_as_the_same_object() -> None:
     gains = gains_along(plan())
     assert gains is not None
     for time in np.random.default_rng(3).uniform(-1.0, 3.0, 200):
@@ -35,7 +35,7 @@ def test_the_nearest_row_is_taken_and_it_is_the_same_object_each_time() -> None:
         assert gains.at(time) is gains.rows[nearest]
 
 
-def test_samples_further_apart_than_the_rows_are_taken_once_each() -> None:
+def test_sparse_samples_have_one_row_each() -> None:
     gains = gains_along(plan(rate=1.0), every=0.1)
     assert gains is not None
     np.testing.assert_allclose(gains.time, [0.0, 1.0, 2.0, 2.2], atol=1e-12)
@@ -56,7 +56,7 @@ def test_a_robot_without_redundancy_has_no_tension_loop() -> None:
     assert gains_along(sl.inverse(tripod, sl.Pose((0.2, 0.1, 1.0), np.eye(3)))) is None
 
 
-def test_what_it_cannot_be_made_of_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     with refused("plan", "of poses without a path", kind=sl.InvalidValueError):
         gains_along(stops())
     with refused("every", "0 s", kind=sl.InvalidValueError):

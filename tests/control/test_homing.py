@@ -1,4 +1,4 @@
-"""Homing with cells and groups that are not to be believed."""
+"""Homing with load cells and groups that are not trustworthy."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def with_age(sample: Sample) -> Sample:
         (with_age, False, r"group 1 .* 0\.05\d* s"),
     ],
 )
-def test_a_jog_ends_where_tensions_are_no_numbers_or_old(change: Any, ruled: bool, why: str) -> None:
+def test_a_jog_ends_if_tensions_are_nan_or_old(change: Any, ruled: bool, why: str) -> None:
     control, _ = rig(home=False)
     control.connect()
     control.begin_homing(HOME)
@@ -114,7 +114,7 @@ def test_homing_accepts_deviations_of_five_sigma_either_way() -> None:
         assert found == [*(WINDOW - 1) * [False], agrees], share
 
 
-def test_cells_are_as_good_as_the_robot_says() -> None:
+def test_precision_of_cells_is_that_of_the_robot() -> None:
     robot = prototype()
     assert robot.winches is not None
     deviation, bias = cell_errors(robot)

@@ -1,4 +1,4 @@
-"""Homing against the lengths that a machine has."""
+"""Homing with measured lengths of a machine."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_right_lengths_are_replaced_only_after_a_confirmation(by: Any, cable: in
     assert np.abs(machine.reading.position - HOME.position - by).max() < 1e-4  # nothing has moved
 
 
-def test_a_confirmation_belongs_to_what_was_reported() -> None:
+def test_a_confirmation_is_valid_only_for_the_reported_pose() -> None:
     control, _ = displaced((0.1, 0.0, 0.0))
     with refused("confirming", kind=RefusedError):
         control.confirm_homing()
@@ -129,7 +129,7 @@ def test_without_length_zeros_the_tensions_of_the_first_homing_decide() -> None:
     assert np.abs(machine.reading.position - [0.1, 0.0, 1.5]).max() < 1e-3
 
 
-def test_what_the_tension_loop_has_corrected_belongs_to_the_lengths() -> None:
+def test_corrections_of_the_tension_loop_belong_to_the_lengths() -> None:
     control, machine = rig(imperfect(zero=2e-3))
     there = at(0.05, 0.0, 1.5)
     control.go_to(there)
@@ -201,7 +201,7 @@ def lands(by: Array, seed: int) -> float | None:
 
 
 @pytest.mark.parametrize("count", [4, pytest.param(60, marks=pytest.mark.extended)])
-def test_no_accepted_homing_leads_further_off_than_its_tolerance(count: int) -> None:
+def test_accepted_homings_stay_within_the_tolerance(count: int) -> None:
     """Displacements along and about all axes, from far within the tolerance of homing to far beyond it."""
     random = np.random.default_rng(count)
     slope = sl.stiffness(sl.inverse(prototype(), TARGET).state).length_sensitivity[:3]

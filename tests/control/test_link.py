@@ -1,4 +1,4 @@
-"""What a link sends, and which of two counters is newer."""
+"""Data that a link sends, and the order of counters."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ def command(mode: Mode, claims: bool) -> Command:
 @pytest.mark.parametrize("mode", Mode)
 @pytest.mark.parametrize("claims", [True, False])
 @pytest.mark.parametrize("owner", [0, MINE, OTHER])
-def test_a_command_goes_to_its_owners_groups_and_a_claim_where_it_says_so(mode: Mode, claims: bool, owner: int) -> None:
+def test_commands_go_to_owned_groups_and_claims_to_requested_ones(mode: Mode, claims: bool, owner: int) -> None:
     asks = claims and mode is not Mode.LEAVE
     expected = Sent.COMMAND if owner == MINE else Sent.CLAIM if asks else Sent.NOTHING
     assert sent_to(owner, command(mode, claims)) is expected
 
 
-def test_a_counter_is_newer_by_less_than_half_of_all() -> None:
+def test_a_counter_is_newer_by_less_than_half_of_its_range() -> None:
     half = COUNTERS // 2
     for known in (1, 2, half, COUNTERS - 1, COUNTERS):
         ahead = [(known - 1 + step) % COUNTERS + 1 for step in (0, 1, 99, half - 1, half, COUNTERS - 1)]
         assert [newer(counter, known) for counter in ahead] == [False, True, True, True, False, False]
 
 
-def test_a_link_claims_nothing_where_the_command_does_not() -> None:
+def test_a_link_claims_only_requested_groups() -> None:
     link = sl.twin.Machine(sl.load_robot("article-prototype"), seed=1).link()
     owners = []
     for claims in (False, False, True, True):
@@ -43,7 +43,7 @@ def test_a_link_claims_nothing_where_the_command_does_not() -> None:
     assert owners[-1] == {MINE}
 
 
-def test_a_reading_below_zero_is_no_tension_that_a_motor_could_hold() -> None:
+def test_a_negative_reading_is_no_tension_of_a_motor() -> None:
     control, machine = rig(home=False)
     machine.inject("cell 3 reads -4 N")
     for _ in range(30):

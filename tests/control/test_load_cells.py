@@ -1,4 +1,4 @@
-"""What the platform's balance says of each load cell."""
+"""Parity of the load cells by the balance of the platform."""
 
 from collections.abc import Callable
 
@@ -32,7 +32,7 @@ def likeness(matrix: Array) -> Array:
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_the_wrench_of_one_cable_that_is_pulled_harder(name: str) -> None:
+def test_the_wrench_of_one_shortened_cable(name: str) -> None:
     """The platform held: one length shorter, by the cable model alone."""
     plan = PLANS[name]()
     state, robot = plan.state, plan.state.one_robot
@@ -59,7 +59,7 @@ def _held(state: sl.Equilibrium, robot: sl.Robot, change: Array) -> tuple[Array,
     return wrench, hanging.frame_end_tension
 
 
-def test_between_74_and_97_percent_of_a_cells_error_are_visible() -> None:
+def test_74_to_97_percent_of_the_error_of_a_cell_are_visible() -> None:
     seen = np.sqrt(np.einsum("...ii->...i", visible(stops().state)))
     assert seen.min() == pytest.approx(0.74, abs=0.005)
     assert seen.max() == pytest.approx(0.97, abs=0.005)
@@ -80,7 +80,7 @@ def test_two_cells_resemble_each_other_and_a_load_not_too_much() -> None:
 
 
 @pytest.mark.parametrize("cell", range(8))
-def test_the_cell_that_is_off_has_the_largest_parity_and_tells_by_how_much(cell: int) -> None:
+def test_the_wrong_cell_has_the_largest_parity_and_its_error_is_estimated(cell: int) -> None:
     rows = parity(stops().state)
     error = np.zeros(8)
     error[cell] = -20.0

@@ -1,4 +1,4 @@
-"""What the loops can bear: the tension loop at any delay, the drives' loops on the flexible platform."""
+"""Stability margins: the tension loop with any delay, the loops of the drives on the flexible platform."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_the_tension_loop_has_20_db_and_55_degrees_at_any_delay_to_five_cycles(d
     assert found.crossover / PERIOD == pytest.approx(0.909, abs=1e-3)  # rad/s
 
 
-def test_what_the_loop_does_is_what_was_counted() -> None:
+def test_the_loop_has_the_computed_frequency_response() -> None:
     """Its answer to one error, one cycle long, has the frequency response of filter and integrator."""
     loop = TensionLoop(8, TensionSettings(gain=0.01, **ALWAYS))
     added = [loop.step(PLANNED + (ERROR if k == 0 else 0.0), PLANNED, ROW) for k in range(6000)]
@@ -71,7 +71,7 @@ def test_what_the_loop_does_is_what_was_counted() -> None:
     np.testing.assert_allclose(response / z, outer_loop(0.01, 0, turn) / lag, rtol=1e-6)
 
 
-def test_the_loop_itself_bears_20_db_and_a_second_more_of_delay() -> None:
+def test_the_loop_is_stable_with_20_db_and_a_second_of_delay() -> None:
     """A gain of 0.1, the most that is taken, is ten times that of the default; 55 degrees at 0.91 rad/s are 1.05 s."""
     for settings, delay in ((TensionSettings(gain=0.1, **ALWAYS), 5), (TensionSettings(**ALWAYS), 5 + 105)):
         errors = closed(settings, delay, 6000)
@@ -91,7 +91,7 @@ def test_the_integrator_alone_is_stable_up_to_the_gain_of_the_formula(delay: int
 
 
 @pytest.mark.parametrize(("delay", "limit"), [(1, 0.48), (2, 0.32), (3, 0.25), (5, 0.17)])
-def test_the_largest_gain_that_is_taken_is_below_the_limit_of_stability(delay: int, limit: float) -> None:
+def test_the_largest_accepted_gain_is_below_the_limit_of_stability(delay: int, limit: float) -> None:
     """With inner loops of 10 Hz and a filter of 0.5 s the limit is found by roots."""
     share = PERIOD / (0.5 + PERIOD)
     poles = np.polymul(np.polymul([1.0, -1.0], [1.0, -(1.0 - share)]), [1.0, -(1.0 - LAG)])
@@ -157,7 +157,7 @@ def test_ten_times_the_integral_gain_feeds_the_slowest_modes(count: int) -> None
     assert above.phase >= 54.0
 
 
-def test_what_the_integral_gain_feeds_the_friction_of_the_drives_takes() -> None:
+def test_friction_of_the_drives_damps_the_effect_of_the_integral_gain() -> None:
     """At a stop whose linear model grows: a swing of the platform dies away."""
     planned = stops().state[10]
     state = replace(planned, robot=integral(80e3))
@@ -170,7 +170,7 @@ def test_what_the_integral_gain_feeds_the_friction_of_the_drives_takes() -> None
     assert swings[-1] < 0.5 * swings[0]
 
 
-def test_margins_of_a_loop_that_is_known() -> None:
+def test_margins_of_a_known_loop() -> None:
     """k/(s (s + 1)^2): the gain may be 2/k times as large; at a gain of 1/2 the phase is 90 - 2 atan(w) degrees."""
     frequency = np.geomspace(1e-2, 1e2, 20_000)
     s = 1j * frequency
@@ -179,7 +179,7 @@ def test_margins_of_a_loop_that_is_known() -> None:
     assert found.phase == pytest.approx(90.0 - 2.0 * np.degrees(np.arctan(found.crossover)), abs=0.05)
 
 
-def test_the_linear_drives_move_as_the_simulated_ones() -> None:
+def test_linear_and_simulated_drives_agree() -> None:
     """A small push, without friction; loops of 1 kHz that read, work and hold lag by a millisecond or less."""
     winch = PROTOTYPE.winches
     assert winch is not None

@@ -1,4 +1,4 @@
-"""What is raised within a cycle, answers that cease, and a place that is lost: the winches come to rest."""
+"""Exceptions in a cycle, missing answers and a lost pose: the winches come to rest."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Bursting(Watcher):
 
 
 @pytest.mark.parametrize("where", wide(["cycle", "event", "stopped", "ends"], first=2))
-def test_one_who_looks_on_and_raises_is_dropped_and_the_motion_goes_on(where: str) -> None:
+def test_an_observer_that_raises_is_removed_and_the_motion_continues(where: str) -> None:
     control, _ = rig(record=Bursting(where))
     done = control.go_to(at(0.05, 0.0, 1.5))
     assert (done.status, control.state) == (ExecutionStatus.DONE, State.IDLE)
@@ -84,7 +84,7 @@ BURSTS: list[tuple[Any, bool]] = [
 
 
 @pytest.mark.parametrize(("break_it", "sends"), BURSTS)
-def test_what_is_raised_in_a_cycle_holds_the_winches_and_is_raised_again(break_it: Any, sends: bool) -> None:
+def test_an_exception_in_a_cycle_holds_the_winches_and_is_raised_again(break_it: Any, sends: bool) -> None:
     """The state stayed MOVING, a set point stood in the command, and garbage was never collected again."""
     control, machine = rig()
     control.start(control.path_to(at(0.2, 0.0, 1.5)))
@@ -113,7 +113,7 @@ def test_what_is_raised_in_a_cycle_holds_the_winches_and_is_raised_again(break_i
             assert not report.status & (GroupStatus.FOLLOWING | GroupStatus.RAMPING)
 
 
-def test_what_is_raised_while_it_connects_gives_the_grants_back() -> None:
+def test_an_exception_during_connecting_releases_the_grants() -> None:
     control, _ = rig(home=False)
     control.claim()
     for _ in range(4):
@@ -129,7 +129,7 @@ def test_what_is_raised_while_it_connects_gives_the_grants_back() -> None:
     assert set(control.sample.owner.tolist()) == {0}
 
 
-def test_answers_that_cease_grow_old_and_it_stops() -> None:
+def test_missing_answers_stop_the_machine() -> None:
     """A link that has no sample any more, though it had some, let every rule sleep."""
     control, _ = rig()
     control.start(control.path_to(at(0.2, 0.0, 1.5)))
@@ -151,7 +151,7 @@ def test_answers_that_cease_grow_old_and_it_stops() -> None:
     assert control.sample.age.min() > 0.1
 
 
-def test_a_place_that_is_lost_on_the_way_stops_it() -> None:
+def test_a_lost_pose_stops_the_machine() -> None:
     control, _ = rig()
     control.start(control.path_to(at(0.2, 0.0, 1.5)))
     for _ in range(50):

@@ -1,4 +1,4 @@
-"""The null space of lengths, against solved equilibria of changed lengths."""
+"""The null space of lengths compared with equilibria of changed lengths."""
 
 from functools import cache
 
@@ -37,7 +37,7 @@ def slope(state: sl.Equilibrium, direction: Array) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_projected_lengths_leave_the_platform_where_it_is(name: str) -> None:
+def test_projected_lengths_do_not_move_the_platform(name: str) -> None:
     state = PLANS[name]().state
     direction = np.random.default_rng(1).normal(size=state.unstrained_length.shape)
     inside = (null_space(state).projection @ direction[..., None])[..., 0]
@@ -48,7 +48,7 @@ def test_projected_lengths_leave_the_platform_where_it_is(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_the_correction_makes_up_what_is_visible_and_nothing_else(name: str) -> None:
+def test_the_correction_is_exactly_the_visible_error(name: str) -> None:
     state = PLANS[name]().state
     error = 5.0 * np.random.default_rng(2).normal(size=state.unstrained_length.shape)
     known = null_space(state)
@@ -58,7 +58,7 @@ def test_the_correction_makes_up_what_is_visible_and_nothing_else(name: str) -> 
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_what_is_visible_is_a_projection_along_the_wrench(name: str) -> None:
+def test_the_visible_error_is_a_projection_along_the_wrench(name: str) -> None:
     """Rank 2, idempotent, symmetric; what it takes away is at right angles to what lengths can do."""
     known = null_space(PLANS[name]().state)
     visible = known.visible
@@ -69,20 +69,20 @@ def test_what_is_visible_is_a_projection_along_the_wrench(name: str) -> None:
     np.testing.assert_allclose(known.projection @ known.correction, known.correction, atol=1e-12)
 
 
-def test_a_millimeter_that_moves_nothing_changes_the_prototypes_tensions_by_three_to_four_newtons() -> None:
+def test_a_null_space_millimeter_changes_tensions_by_three_to_four_newtons() -> None:
     slopes = 1.0 / np.linalg.svd(null_space(stops().state).correction, compute_uv=False)[:, :2]
     assert 2.79e3 < slopes.min() < 2.81e3
     assert 3.97e3 < slopes.max() < 3.98e3
 
 
-def test_one_pose_has_what_it_has_in_a_batch() -> None:
+def test_single_poses_agree_with_batches() -> None:
     single, batch = null_space(stops().state[3]), null_space(stops().state)
     for one, many in zip(single, batch, strict=True):
         np.testing.assert_allclose(one, many[3], atol=1e-12)
         assert not one.flags.writeable
 
 
-def test_a_pose_without_lengths_has_none_and_leaves_the_others_theirs() -> None:
+def test_a_pose_without_lengths_does_not_affect_others() -> None:
     places = np.array([[0.0, 0.0, 1.5], [0.0, 0.0, 3.5]])
     plan = sl.inverse(PROTOTYPE, sl.Pose(places, np.broadcast_to(np.eye(3), (2, 3, 3))))
     assert plan.feasible.tolist() == [True, False]

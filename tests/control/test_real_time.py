@@ -1,4 +1,4 @@
-"""Ticks that do not drift, and how late they were, on a clock that the test turns."""
+"""Ticks without drift, and their delays, on a simulated clock."""
 
 import os
 import time
@@ -26,7 +26,7 @@ def turned(monkeypatch: pytest.MonkeyPatch, over: float = 0.0) -> Clock:
     return clock
 
 
-def test_ticks_do_not_drift_whatever_a_cycle_takes_and_a_sleep_adds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ticks_do_not_drift(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = turned(monkeypatch, over=2e-4)
     pace = Pace(0.01)
     begins = []
@@ -39,7 +39,7 @@ def test_ticks_do_not_drift_whatever_a_cycle_takes_and_a_sleep_adds(monkeypatch:
     assert pace.periods.quantile(0.999) == pytest.approx(0.0102, abs=2e-4)
 
 
-def test_a_cycle_that_took_too_long_is_told_and_missed_ticks_do_not_come_in_a_burst(
+def test_a_long_cycle_is_reported_and_missed_ticks_are_skipped(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = turned(monkeypatch)
@@ -57,7 +57,7 @@ def test_a_cycle_that_took_too_long_is_told_and_missed_ticks_do_not_come_in_a_bu
     assert pace.lateness.longest == pytest.approx(0.04, abs=1e-9)
 
 
-def test_a_priority_is_that_of_the_system_and_a_missing_right_names_the_command(
+def test_the_priority_is_set_and_a_missing_permission_names_the_command(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[tuple[int, int, int]] = []
@@ -80,7 +80,7 @@ def test_a_priority_is_that_of_the_system_and_a_missing_right_names_the_command(
         set_priority(50)
 
 
-def test_quantiles_are_the_ends_of_their_bins() -> None:
+def test_quantiles_are_upper_ends_of_bins() -> None:
     histogram = Histogram()
     assert histogram.quantile(0.5) == 0.0
     for duration in [0.00005] * 90 + [0.00125] * 9 + [0.5]:

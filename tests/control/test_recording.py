@@ -1,4 +1,4 @@
-"""What a table keeps: every number of every cycle, whatever the room that was made."""
+"""Recordings contain all numbers of all cycles for any initial capacity."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def made(k: int) -> Recorded:
 
 
 @pytest.mark.parametrize("expected", [1, 3, 9])
-def test_everything_that_was_put_in_comes_out(expected: int) -> None:
+def test_a_recording_contains_all_added_cycles(expected: int) -> None:
     table, cycles = CycleTable(M, G, expected), [made(k) for k in range(8)]
     for cycle in cycles:
         table.add(cycle)
@@ -63,7 +63,7 @@ def test_everything_that_was_put_in_comes_out(expected: int) -> None:
     assert np.isnan(done.set_length[1]).all()
 
 
-def test_what_was_taken_out_stays_while_more_comes() -> None:
+def test_returned_data_do_not_change_later() -> None:
     table, cycles = CycleTable(M, G, 2), [made(k) for k in range(4)]
     for cycle in cycles[:2]:
         table.add(cycle)

@@ -1,4 +1,4 @@
-"""Lengths that are off a plan fade into it no faster than a winch is jogged, and the tension loop waits."""
+"""Deviations of lengths from a plan decay no faster than the jog speed of a winch, and the tension loop waits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PERIOD = 0.01
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 5e-3, 0.03])
-def test_a_lead_fades_smoothly_and_no_faster_than_its_speed(size: float) -> None:
+def test_a_lead_decays_smoothly_within_its_speed(size: float) -> None:
     lead = size * np.array([1.0, -0.5, 0.0])
     fade, lengths, rates = Fade(lead, PERIOD), [lead], [np.zeros(3)]
     while (left := fade.step()) is not None:
@@ -56,7 +56,7 @@ def test_between_two_rows_lengths_are_cubic_and_tensions_linear() -> None:
     assert sum(0.1 < fraction < 0.4 or 0.6 < fraction < 0.9 for fraction in fractions) > 5
 
 
-def test_a_jog_of_the_platform_after_one_of_a_winch_is_no_faster_and_the_loop_waits() -> None:
+def test_a_platform_jog_after_a_winch_jog_is_slow_and_the_loop_waits() -> None:
     """The lead went within 0.4 s: 31 mm/s at a winch; and the loop took what it changed for an error."""
     control, _ = rig()
     control.jog(3, 8e-3)
@@ -77,7 +77,7 @@ def test_the_tension_loop_learns_nothing_from_a_lead() -> None:
     assert not done.correction.any()
 
 
-def test_a_lead_of_more_than_five_millimeters_is_refused_and_the_way_back_goes() -> None:
+def test_a_lead_above_five_millimeters_is_refused_except_its_reduction() -> None:
     control, _ = rig()
     control.jog(3, 0.03)
     for begin in (lambda: control.start_jog_platform([1e-3, 0, 0]), lambda: control.go_to(at(0.1, 0.0, 1.5))):

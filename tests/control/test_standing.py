@@ -1,4 +1,4 @@
-"""Where the platform stands: what the encoders say of it, and kernels that are loaded in advance."""
+"""Pose of the platform at rest by the encoders, and kernels loaded in advance."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def is_degraded(control: Controller) -> bool:
     return control.degraded
 
 
-def test_what_the_tension_loop_added_is_not_taken_for_a_way_of_the_platform() -> None:
+def test_corrections_of_the_tension_loop_do_not_move_the_estimate() -> None:
     """An encoder that reads a millimeter too much, made up for by the loop: the estimate is the truth."""
     control, _ = rig()
     off = np.zeros(8)
@@ -32,7 +32,7 @@ def test_what_the_tension_loop_added_is_not_taken_for_a_way_of_the_platform() ->
     assert np.abs(control.estimate.position - [0.01, -0.02, 1.49]).max() < 1e-8
 
 
-def test_a_cell_that_is_mended_is_believed_again() -> None:
+def test_a_repaired_load_cell_is_trusted_again() -> None:
     """There was no way out: acknowledging was refused in IDLE, and only there it was told to do so."""
     control, machine = rig()
     machine.inject(Injected("cell sticks", 3, 0.0, machine.time + 0.2, 2.5))
@@ -63,7 +63,7 @@ def test_the_rule_for_the_correction_is_that_of_the_loop() -> None:
     assert "allowed: 1 mm" in told[0]
 
 
-def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_refused_part_does_not_prevent_loading_of_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     tried = list[str]()
 
     def trying(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""The table of states against section 13's, and what it refuses."""
+"""The table of states compared with section 13 of the model, and refusals."""
 
 import pytest
 
@@ -9,20 +9,20 @@ def test_every_state_has_one_row_in_the_order_of_the_codes() -> None:
     assert list(TABLE) == list(State)
 
 
-def test_every_state_that_holds_a_grant_and_is_no_end_stops_on_a_fault() -> None:
+def test_states_with_a_grant_stop_on_a_fault() -> None:
     after = {State.STOPPING, State.FAULT, State.EMERGENCY}
     for state in OWNING - after:
         assert State.STOPPING in TABLE[state][1]
 
 
-def test_every_state_with_a_grant_leads_to_emergency_and_only_off_leads_away() -> None:
+def test_states_with_a_grant_lead_to_emergency_until_off() -> None:
     for state in OWNING - {State.EMERGENCY}:  # while it connects the brakes are on: it is refused
         assert State.EMERGENCY in TABLE[state][1]
     assert list(TABLE[State.EMERGENCY][1]) == [State.OFF]
     assert list(TABLE[State.OFF][1]) == [State.CONNECTING]
 
 
-def test_nothing_moves_a_robot_whose_place_is_not_known() -> None:
+def test_a_robot_with_an_unknown_pose_does_not_move() -> None:
     """Only homing, or a place that is still known, leads to where paths begin."""
     assert [state for state in State if State.MOVING in TABLE[state][1]] == [State.IDLE]
     assert {state for state in State if State.IDLE in TABLE[state][1]} == {
@@ -35,7 +35,7 @@ def test_nothing_moves_a_robot_whose_place_is_not_known() -> None:
     }
 
 
-def test_what_is_not_listed_is_refused_in_one_line_with_the_ways_that_there_are() -> None:
+def test_other_transitions_are_refused_with_the_valid_ones() -> None:
     for state in State:
         for to in State:
             if to in TABLE[state][1]:

@@ -1,4 +1,4 @@
-"""The tension loop on hand-made errors, and on the prototype's equilibria."""
+"""The tension loop with artificial errors and at equilibria of the prototype."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_a_wrench_error_is_shown_and_never_fed_back() -> None:
     assert loop.error < 1e-9
 
 
-def test_one_step_is_that_of_the_formula() -> None:
+def test_one_step_agrees_with_the_formula() -> None:
     settings, period = TensionSettings(filter_time=0.5, gain=0.02, act_above=1.0), 0.01
     loop, error = TensionLoop(8, settings, period), visible_error(100.0)
     added = loop.step(PLANNED + error, PLANNED, ROW)
@@ -60,7 +60,7 @@ def test_one_step_is_that_of_the_formula() -> None:
     np.testing.assert_allclose(again - added, -0.02 * ROW.correction @ filtered, rtol=1e-12, atol=1e-18)
 
 
-def test_wrong_zeros_are_made_up_for_and_the_platform_stays() -> None:
+def test_wrong_zeros_are_corrected_without_motion() -> None:
     """Lengths wrong inside the null space: tensions come back to the plan, within the band, and the platform rests."""
     zeros = 5e-3 * ROW.projection @ np.random.default_rng(5).normal(size=8)
     loop, added, moved = TensionLoop(8), np.zeros(8), 0.0
@@ -78,7 +78,7 @@ def test_wrong_zeros_are_made_up_for_and_the_platform_stays() -> None:
     assert moved < 2e-5
 
 
-def test_what_was_added_is_fitted_to_the_next_pose_once() -> None:
+def test_corrections_are_transferred_to_the_next_pose_once() -> None:
     other = null_space(stops().state[8])
     loop = TensionLoop(8, QUIET)
     for _ in range(100):
@@ -90,7 +90,7 @@ def test_what_was_added_is_fitted_to_the_next_pose_once() -> None:
     np.testing.assert_array_equal(same, fitted)
 
 
-def test_no_length_is_changed_by_more_than_the_largest_and_the_platform_stays_even_there() -> None:
+def test_corrections_are_limited_without_motion() -> None:
     loop = TensionLoop(8)
     for _ in range(5000):
         added = loop.step(PLANNED + visible_error(50.0), PLANNED, ROW)
@@ -103,7 +103,7 @@ def test_no_length_is_changed_by_more_than_the_largest_and_the_platform_stays_ev
     assert np.abs(added).max() == pytest.approx(5e-3, rel=1e-12)
 
 
-def test_frozen_it_learns_nothing_but_fits_to_the_pose() -> None:
+def test_a_frozen_loop_only_transfers_its_corrections() -> None:
     other = null_space(stops().state[8])
     loop = TensionLoop(8, QUIET)
     added = loop.step(PLANNED + visible_error(5.0), PLANNED, ROW)
@@ -115,7 +115,7 @@ def test_frozen_it_learns_nothing_but_fits_to_the_pose() -> None:
 
 
 @pytest.mark.parametrize("reading", [np.nan, np.inf, -np.inf])
-def test_a_reading_that_is_no_number_does_not_enter_the_filter(reading: float) -> None:
+def test_a_nan_reading_does_not_enter_the_filter(reading: float) -> None:
     """Afterwards the loop does what it does without that cycle."""
     loop, undisturbed, spoiled = TensionLoop(8), TensionLoop(8), PLANNED + visible_error(50.0)
     spoiled[2] = reading
@@ -130,7 +130,7 @@ def test_a_reading_that_is_no_number_does_not_enter_the_filter(reading: float) -
     assert (after != added).any()
 
 
-def test_what_it_hands_out_is_the_callers() -> None:
+def test_returned_arrays_are_copies() -> None:
     loop = TensionLoop(8, QUIET)
     added = loop.step(PLANNED + visible_error(5.0), PLANNED, ROW)
     kept = added.copy()

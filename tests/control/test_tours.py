@@ -1,4 +1,4 @@
-"""What a controller promises of the prototype: where it stands, and what the tension loop does about wrong zeros."""
+"""Accuracy of the prototype at rest, and the effect of the tension loop on wrong zeros."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ RUNS = [pytest.param(SHORT, id="short"), pytest.param(LONG, id="fourteen minutes
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_with_perfect_parameters_it_stands_where_it_should(
+def test_with_exact_parameters_positions_are_exact(
     run: tuple[float, float, int],
 ) -> None:
     """Cells with 1 N of noise and 2 N of bias, 15 N of stiction; a study had 0.007 mm in the mean, 0.014 at most."""
@@ -26,7 +26,7 @@ def test_with_perfect_parameters_it_stands_where_it_should(
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_zeros_that_are_wrong_by_two_millimeters_cost_tension_and_the_loop_brings_it_back(
+def test_the_loop_corrects_tensions_of_two_millimeter_zero_errors(
     run: tuple[float, float, int],
 ) -> None:
     """A study had 4.6 N without the loop, 1.1 N with it, and the platform moved by 0.024 mm."""

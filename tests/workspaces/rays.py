@@ -17,9 +17,9 @@ from sagline.core.errors import InvalidValueError
 from sagline.workspaces.grid import Brackets, Level, brackets, crossings, crossings_of, distance_to_box, level_values
 from sagline.workspaces.surface import Surface
 
-ITERATIONS: Final = 100  # of facets that replace one another along a ray: three are usual
-SHARP: Final = 1e-5  # of facets that limit consecutive parts of a ray: three are usual
-CLOSE: Final = 1e-7  # of the level at the ends of a bracket of at most a hundredth of a ray
+ITERATIONS: Final = 100  # facets that limit consecutive parts of a ray: three are usual
+SHARP: Final = 1e-5  # of the level at the ends of a bracket of at most a hundredth of a ray
+CLOSE: Final = 1e-7  # a level that is treated as zero from below
 
 _POLES: Final = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
 _OCTANTS: Final = np.array(
@@ -33,7 +33,7 @@ FacetLevel = Callable[[Array, Array], Array]
 
 
 def generations(divisions: int) -> tuple[list[tuple[Array, Indices]], Indices]:
-    """Directions spread over the sphere: an octahedron whose edges are halved so often, moved out to length 1.
+    """Directions on the sphere: an octahedron with repeatedly halved edges, projected to length 1.
 
     Args:
         divisions: How often: 4^(divisions + 1) + 2 directions, 4,098 with five.
@@ -100,7 +100,7 @@ def ray_hull(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike, d
 def ray_hull_by_facets(
     facets: Facets, facet_level: FacetLevel, center: ArrayLike, low: ArrayLike, high: ArrayLike, divisions: int = 5
 ) -> Surface:
-    """As `ray_hull`, from outside inward, one facet of the level after the other.
+    """Like `ray_hull`, but from outside inward, with one facet of the level after the other.
 
     The level is the least of many facets'. Where it is negative so is that facet up to its own root, which is cheaper
     to find; and nothing inside is passed over, but what is narrower than the search for the root sees.
@@ -136,7 +136,7 @@ def ray_hull_by_facets(
 
 
 def _origin(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike) -> tuple[Array, float]:
-    """Center, checked, and the level there."""
+    """Checked center, and the level there."""
     origin = exactly(center, "center", "m", (3,))
     outside = (origin <= exactly(low, "low", "m", (3,))) | (origin >= exactly(high, "high", "m", (3,)))
     value = float(level_values(level, origin[None])[0])
@@ -147,14 +147,14 @@ def _origin(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike) ->
 
 
 def _chords(directions: Array, length: Array, parents: Indices, new: Array) -> Array:
-    """Distances along new directions to the chords between the ends of their parents' rays [m]."""
+    """Distances along new directions to the chords between the ends of the rays of their parents [m]."""
     a, b = length[parents].T
     middle: Array = 2.0 * a * b / np.maximum(a + b, np.finfo(np.float64).tiny)
     return _along(middle[:, None] * directions[parents[:, 0]], new)
 
 
 def _ends(level: Level, origin: Array, directions: Array, ends: Brackets, precision: float) -> Array:
-    """Distance along its ray of each sign change [m]."""
+    """Distance of each sign change along its ray [m]."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     share = crossings(level, inner, outer, at_inner, at_outer, precision=precision)
     return _along(inner + share[:, None] * (outer - inner) - origin, directions[ends.k])
@@ -166,7 +166,7 @@ def _along(positions: Array, directions: Array) -> Array:
 
 
 def _slope(ends: Brackets) -> Array:
-    """Fall of the level along each ray, about [1/m]."""
+    """Decrease of the level along each ray, approximately [1/m]."""
     width = np.linalg.norm(ends.outer - ends.inner, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         slope: Array = (ends.at_inner - ends.at_outer) / width
@@ -176,7 +176,7 @@ def _slope(ends: Brackets) -> Array:
 
 
 def _roots(facet_level: FacetLevel, facet: Array, outer: Array, at_outer: Array, origin: Array) -> Array:
-    """Share of rays up to the roots of facets; 0 where a facet's level is negative at the center too."""
+    """Share of rays up to the roots of facets; 0 if the level of a facet is negative at the center as well."""
     centers = np.broadcast_to(origin, outer.shape)
     at_center = facet_level(facet, centers)
     k = np.flatnonzero(at_center >= 0.0)

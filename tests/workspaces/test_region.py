@@ -10,7 +10,7 @@ from sagline.workspaces.levels import Details, Plane, slice_of
 
 
 def places(positions: Array) -> Details:
-    """Numbers by which a position is known again."""
+    """Numbers that identify a position."""
     x, y, z = positions.T
     indices = (np.rint(y).astype(np.int64), np.rint(z).astype(np.int64), np.zeros(len(x), dtype=np.int64))
     return Details(x + 10.0 * y + 100.0 * z, x, *indices, np.zeros(len(x)))
