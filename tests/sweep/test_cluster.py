@@ -17,7 +17,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.sweep import cluster
+from sagline.sweep import running
 from tests.sweep.requests import bits, chunks, in_tasks, marked, planar
 from tests.tiers import extended
 
@@ -132,7 +132,7 @@ def test_a_killed_scheduler_loses_no_results(tmp_path: Path, reference: dict[str
 
 @pytest.mark.soak
 def test_a_scheduler_without_workers_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "PATIENCE", 3.0)
+    monkeypatch.setattr(running, "PATIENCE", 3.0)
     with (
         scheduler(tmp_path, workers=0) as (address, _),
         pytest.raises(sl.SaglineError, match=f"dask worker {address}"),
@@ -141,7 +141,7 @@ def test_a_scheduler_without_workers_is_reported(tmp_path: Path, monkeypatch: py
 
 
 def test_an_address_without_a_scheduler_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(running, "PATIENCE", 0.5)
     with pytest.raises(sl.SaglineError, match=r"tcp://127\.0\.0\.1:9") as error:
         sl.sweep.run(planar(3, 2), tmp_path / "sweep", scheduler="tcp://127.0.0.1:9")
     assert len(str(error.value)) < 300

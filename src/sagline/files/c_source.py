@@ -19,18 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.cables.models import Catenary
-from sagline.control.link import (
-    COUNTERS,
-    GROUP_SIZE,
-    HEARTBEAT,
-    OWNER_TIMEOUT,
-    PERIOD,
-    RAMP,
-    GroupFault,
-    GroupStatus,
-    Mode,
-    WinchState,
-)
+from sagline.control import link
 from sagline.core.arguments import file_path, flag, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
@@ -284,32 +273,32 @@ def _scl_words(robot: Robot) -> dict[str, str]:
     limits = plc_limits(robot)
     words = {
         **origin(robot),
-        "group_size": str(GROUP_SIZE),
+        "group_size": str(link.GROUP_SIZE),
         "numbers": ", ".join(str(block.number) for block in BLOCKS),
         "blocks": "\n".join(_block(block) for block in BLOCKS),
         "winches": str(robot.cable_count),
         "most_winches": str(robot.cable_count),
         "limits": "\n".join(_row(name, values) for name, values in limits._asdict().items()),
         "layout": str(LAYOUT),
-        "counters": str(COUNTERS),
-        "half": str(COUNTERS // 2),
+        "counters": str(link.COUNTERS),
+        "half": str(link.COUNTERS // 2),
         "tiny": f"{TINY:.1E}",
         "following_error": str(FOLLOWING),
-        "heartbeat": str(HEARTBEAT),
-        "owner_timeout": str(OWNER_TIMEOUT),
-        "ramp": str(RAMP),
-        "cycle": str(PERIOD),
+        "heartbeat": str(link.HEARTBEAT),
+        "owner_timeout": str(link.OWNER_TIMEOUT),
+        "ramp": str(link.RAMP),
+        "cycle": str(link.PERIOD),
     }
     words |= {
         f"{end}_magic": f"16#{block.magic:08X}" for end, block in zip(("from", "to", "claim"), BLOCKS, strict=True)
     }
-    words |= {mode.name.lower(): str(int(mode)) for mode in Mode}
-    words |= {f"{fault.name.lower()}_fault": str(int(fault)) for fault in GroupFault}
+    words |= {mode.name.lower(): str(int(mode)) for mode in link.Mode}
+    words |= {f"{fault.name.lower()}_fault": str(int(fault)) for fault in link.GroupFault}
     words["emergency_fault"] = words["emergency_stop_fault"]
-    words |= {f"{status.name.lower()}_bit": str(int(status)) for status in GroupStatus if status.name}
-    words |= {f"state_{state.name.lower()}": str(int(state)) for state in WinchState}
-    words["emergency_bits"] = str(int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED))
-    words["locked_bits"] = str(int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED))
+    words |= {f"{status.name.lower()}_bit": str(int(status)) for status in link.GroupStatus if status.name}
+    words |= {f"state_{state.name.lower()}": str(int(state)) for state in link.WinchState}
+    words["emergency_bits"] = str(int(link.GroupStatus.EMERGENCY | link.GroupStatus.LOCKED | link.GroupStatus.BRAKED))
+    words["locked_bits"] = str(int(link.GroupStatus.READY | link.GroupStatus.LOCKED | link.GroupStatus.BRAKED))
     return words
 
 
@@ -329,7 +318,10 @@ def _field(field: Field, indent: str) -> list[str]:
     if isinstance(kind, str):
         return [f"{indent}{field.name} : {kind};".ljust(40) + f"// {field.offset}: {field.meaning}"]
     inside = [line for each in kind for line in _field(each, indent + "   ")]
-    begin = f"{indent}{field.name} : Array[1..{GROUP_SIZE}] of Struct".ljust(40) + f"// {field.offset}: {field.meaning}"
+    begin = (
+        f"{indent}{field.name} : Array[1..{link.GROUP_SIZE}] of Struct".ljust(40)
+        + f"// {field.offset}: {field.meaning}"
+    )
     return [begin, *inside, f"{indent}END_STRUCT;"]
 
 

@@ -13,17 +13,8 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import file_path, optional, text
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
+from sagline.files import robot_xml as xml
 from sagline.files.reading import exists, value_errors
-from sagline.files.robot_xml import (
-    Imported,
-    cables_of_file,
-    number_of_text,
-    numbers_of_text,
-    only_child,
-    read_xml,
-    vertical_axis,
-    with_losses,
-)
 from sagline.robot.pattern import MotionPattern
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -47,7 +38,9 @@ _JOINTS: Final[dict[str, tuple[MotionPattern, _Vector | None]]] = {
 }
 
 
-def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cable_set: str | None = None) -> Imported:
+def load_caspr(
+    source: str | os.PathLike[str], cables: Cable | None = None, cable_set: str | None = None
+) -> xml.Imported:
     """Read a CASPR robot with one platform.
 
     Cables in CASPR have no weight, and ideal cables do not stretch. Without the argument `cables`, missing values are
@@ -76,14 +69,14 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
         text(cable_set, "cable_set")
     bodies, cables_file = _files(file_path(source, "source", folder=True))
     with value_errors(bodies):
-        platform, lost = _platform(read_xml(bodies))
+        platform, lost = _platform(xml.read_xml(bodies))
     with value_errors(cables_file):
-        chosen = _select_set(read_xml(cables_file), cable_set, lost)
+        chosen = _select_set(xml.read_xml(cables_file), cable_set, lost)
         columns = _columns(chosen, platform["center_of_mass"], lost)
         stiffness, radii, axes = (columns.pop(name) for name in ("axial_stiffness", "pulley_radius", "swivel_axis"))
         assumed: dict[str, str] = {}
         if cables is None:
-            cables = cables_of_file([None] * len(stiffness), stiffness, "CASPR", assumed)
+            cables = xml.cables_of_file([None] * len(stiffness), stiffness, "CASPR", assumed)
         robot = Robot(
             bodies.stem.removesuffix("_bodies"),
             cables=cables,
@@ -93,7 +86,7 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
             **columns,
             **platform,
         )
-    return with_losses(robot, tuple(lost))
+    return xml.with_losses(robot, tuple(lost))
 
 
 def _files(source: Path) -> tuple[Path, Path]:
@@ -103,13 +96,13 @@ def _files(source: Path) -> tuple[Path, Path]:
     folder = source if source.is_dir() else source.parent
     folder = folder.parent if folder.name == "cables" else folder
     beside = sorted((*folder.glob("*.xml"), *folder.glob("cables/*.xml")))
-    if not source.is_dir() and _kind(read_xml(source)) is None:
+    if not source.is_dir() and _kind(xml.read_xml(source)) is None:
         raise FileError(
             source, "contains neither <link_rigid> nor <cables>", "Check that this is the CASPR file you mean."
         )
     found: dict[str, list[Path]] = {"bodies": [], "cables": []}
     for file in beside if source.is_dir() else [source, *beside]:
-        kind = _kind(read_xml(file))
+        kind = _kind(xml.read_xml(file))
         if kind is not None and not (found[kind] and source in found[kind]):
             found[kind].append(file)
     for kind, files in found.items():
@@ -132,13 +125,13 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
     if len(links) != 1:
         raise InvalidValueError("number of <link_rigid>", len(links), "1", "sagline supports a single platform.")
     link = links[0]
-    joint = only_child(link, "joint", "link_rigid").get("type", "")
+    joint = xml.only_child(link, "joint", "link_rigid").get("type", "")
     if joint not in _JOINTS:
         raise InvalidValueError("joint type", repr(joint), ", ".join(_JOINTS), "sagline supports only free platforms.")
-    physical = only_child(link, "physical", "link_rigid")
-    mass = number_of_text(physical.findtext("mass"), "mass", "kg")
-    center = numbers_of_text(physical.findtext("com_location"), 3, "com_location", "m")
-    inertia = _inertia(only_child(physical, "inertia", "physical"), mass, center)
+    physical = xml.only_child(link, "physical", "link_rigid")
+    mass = xml.number_of_text(physical.findtext("mass"), "mass", "kg")
+    center = xml.numbers_of_text(physical.findtext("com_location"), 3, "com_location", "m")
+    inertia = _inertia(xml.only_child(physical, "inertia", "physical"), mass, center)
     fields: dict[str, Any] = {"mass": mass, "inertia": inertia, "center_of_mass": center}
     return fields | dict(zip(("motion_pattern", "plane_normal"), _JOINTS[joint], strict=True)), _lost_of_link(
         root, link
@@ -148,7 +141,7 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
 def _inertia(element: Element, mass: float, center: Array) -> Array:
     """Inertia about the center of mass. CASPR gives the inertia about this center or the joint (platform origin)."""
     xx, yy, zz, xy, xz, yz = (
-        number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+        xml.number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
     )
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     reference = element.get("ref", "")
@@ -162,15 +155,15 @@ def _inertia(element: Element, mass: float, center: Array) -> Array:
 def _lost_of_link(root: Element, link: Element) -> list[str]:
     lost = []
     location = link.findtext("parent/location", "0 0 0")
-    if numbers_of_text(location, 3, "parent: location", "m").any():
+    if xml.numbers_of_text(location, 3, "parent: location", "m").any():
         lost.append(
             f"The joint's position in the base ({location.strip()} m): add it to CASPR's joint position to get the "
             "position of sagline's platform."
         )
     end = link.findtext("physical/end_location", "0 0 0")
-    if numbers_of_text(end, 3, "end_location", "m").any():
+    if xml.numbers_of_text(end, 3, "end_location", "m").any():
         lost.append(f"The end location ({end.strip()} m).")
-    joint = only_child(link, "joint", "link_rigid")
+    joint = xml.only_child(link, "joint", "link_rigid")
     limits = [key for key in ("q_min", "q_max", "q_initial") if joint.get(key)]
     if limits:
         lost.append(f"The joint's {', '.join(limits)}.")
@@ -205,7 +198,7 @@ def _columns(chosen: Element, center: Array, lost: list[str]) -> dict[str, Any]:
 
 def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[Any, ...]:
     """Values of a cable in the order of `_COLUMNS`; the axial stiffness is None if the file does not give it."""
-    ends = list(only_child(element, "attachments", item))
+    ends = list(xml.only_child(element, "attachments", item))
     if len(ends) != 2:
         raise InvalidValueError(f"{item}: number of attachments", len(ends), "2", "sagline has no routed cables.")
     points: dict[str, Array] = {}
@@ -213,7 +206,7 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
     for end in ends:
         link = (end.findtext("link") or "0").strip()
         place = end.findtext("location") or end.findtext("fixed_location")
-        points[link] = numbers_of_text(place, 3, f"{item}: location on link {link}", "m")
+        points[link] = xml.numbers_of_text(place, 3, f"{item}: location on link {link}", "m")
         if end.tag != "attachment":
             pulley = _pulley(end, link, item, lost)
     if set(points) != {"0", "1"}:
@@ -221,12 +214,12 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
     if element.get("attachment_reference") == "com":
         points["1"] = points["1"] + center
     low, high = (
-        number_of_text(element.findtext(f"properties/{key}"), f"{item}: {key}", "N")
+        xml.number_of_text(element.findtext(f"properties/{key}"), f"{item}: {key}", "N")
         for key in ("force_min", "force_max")
     )
     # K is an axial stiffness in N, because CASPR divides it by the cable's length
     stiffness = element.findtext("properties/K") if element.tag == "cable_linear_spring" else None
-    known = None if stiffness is None else number_of_text(stiffness, f"{item}: K", "N")
+    known = None if stiffness is None else xml.number_of_text(stiffness, f"{item}: K", "N")
     return points["0"], points["1"], low, high, known, *pulley
 
 
@@ -237,9 +230,9 @@ def _pulley(end: Element, link: str, item: str, lost: list[str]) -> tuple[float,
     elif end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:
         unlike = "without pulley_radius and cable_entry_vector"
     else:
-        radius = number_of_text(end.findtext("pulley_radius"), f"{item}: pulley_radius", "m")
-        entry = numbers_of_text(end.findtext("cable_entry_vector"), 3, f"{item}: cable_entry_vector", "")
-        axis = vertical_axis(float(np.hypot(entry[0], entry[1])), float(entry[2]))
+        radius = xml.number_of_text(end.findtext("pulley_radius"), f"{item}: pulley_radius", "m")
+        entry = xml.numbers_of_text(end.findtext("cable_entry_vector"), 3, f"{item}: cable_entry_vector", "")
+        axis = xml.vertical_axis(float(np.hypot(entry[0], entry[1])), float(entry[2]))
         if axis is not None:
             return radius, axis
         unlike = "that is not entered vertically"

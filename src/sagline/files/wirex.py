@@ -14,16 +14,8 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import file_path, optional
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
+from sagline.files import robot_xml as xml
 from sagline.files.reading import value_errors
-from sagline.files.robot_xml import (
-    Imported,
-    cables_of_file,
-    number_of_text,
-    only_child,
-    read_xml,
-    vertical_axis,
-    with_losses,
-)
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot, box_inertia
 from sagline.robot.winch import Winch
@@ -34,7 +26,7 @@ _VERSIONS: Final = ("0.31", "0.32")
 _INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows writes 1.#INF
 
 
-def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
+def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> xml.Imported:
     """Read a robot file of WireX (version 0.31 or 0.32 of its format).
 
     WireX does not require material, inertia or limits. Missing values are assumed and listed in the robot's `assumed`.
@@ -59,7 +51,7 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
     optional(cables, Cable, "cables")
     path = file_path(source, "source")
     with value_errors(path):
-        root = read_xml(path)
+        root = xml.read_xml(path)
         _check_generation(root)
         return _robot(root, path.stem, cables)
 
@@ -79,8 +71,8 @@ def _check_generation(root: Element) -> None:
         )
 
 
-def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
-    robot = only_child(root, "robot", "models")
+def _robot(root: Element, name: str, cables: Cable | None) -> xml.Imported:
+    robot = xml.only_child(root, "robot", "models")
     chains = robot.findall("geometry/chain")
     if not chains:
         raise InvalidValueError("number of <chain>", 0, ">= 1", "Check that the file is complete.")
@@ -111,7 +103,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
         source=f"WireX file {root.get('version', '')}".strip(),
         assumed=assumed,
     )
-    return with_losses(result, (*lost, *_lost(root)))
+    return xml.with_losses(result, (*lost, *_lost(root)))
 
 
 def _optional(element: Element | None, key: str, item: str, unit: str) -> float | None:
@@ -119,16 +111,16 @@ def _optional(element: Element | None, key: str, item: str, unit: str) -> float 
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
         return None
-    return number_of_text(text, f"{item}: {key}", unit)
+    return xml.number_of_text(text, f"{item}: {key}", unit)
 
 
 def _required(element: Element, key: str, item: str, unit: str) -> float:
-    return number_of_text(element.get(key), f"{item}: {key}", unit)
+    return xml.number_of_text(element.get(key), f"{item}: {key}", unit)
 
 
 def _point(chain: Element, tag: str, k: int) -> list[float]:
     item = f"chain {k + 1}"
-    element = only_child(chain, tag, item)
+    element = xml.only_child(chain, tag, item)
     return [_required(element, axis, f"{item}: {tag}", "m") for axis in _AXES]
 
 
@@ -156,7 +148,7 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
         density.append(_optional(element, "weight", item, "kg/m") or None)  # zero in a file means unknown
         stiffness.append((modulus or 0.0) * np.pi * (radius or 0.0) ** 2 or None)
         diameter.append(2.0 * (radius or 0.0))
-    return cables_of_file(density, stiffness, "WireX", assumed, diameter if all(diameter) else None)
+    return xml.cables_of_file(density, stiffness, "WireX", assumed, diameter if all(diameter) else None)
 
 
 def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
@@ -164,7 +156,7 @@ def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[
     lost, radii, axes = [], [], []
     for k, chain in enumerate(chains):
         item = f"chain {k + 1}: base"
-        base = only_child(chain, "base", f"chain {k + 1}")
+        base = xml.only_child(chain, "base", f"chain {k + 1}")
         radius, axis = _optional(base, "radius", item, "m") or 0.0, _axis(base, item)
         if axis is None and radius:
             lost.append(
@@ -192,7 +184,7 @@ def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
     upright = _required(base, "a33", item, "")
     # for a vertical z axis, the last row and the last column are zero off the diagonal
     sideways = max(abs(_optional(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
-    return vertical_axis(sideways, upright)
+    return xml.vertical_axis(sideways, upright)
 
 
 def _drive(winch: Element) -> dict[str, float]:

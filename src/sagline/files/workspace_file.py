@@ -21,15 +21,7 @@ from sagline.files.variables import Quantity, check_indices, check_variables, fi
 from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere
 from sagline.robot.pose import Pose, PoseBox
 from sagline.tension.methods import METHODS
-from sagline.workspaces.criteria import (
-    Clearance,
-    InFrame,
-    LeastFrequency,
-    LeastMargin,
-    LeastStiffness,
-    MaximumSag,
-    PositionError,
-)
+from sagline.workspaces import criteria
 from sagline.workspaces.criterion import Criterion
 from sagline.workspaces.levels import Nearest
 from sagline.workspaces.region import Orientations
@@ -40,42 +32,56 @@ from sagline.workspaces.wrench_sets import WrenchSet
 if TYPE_CHECKING:
     from xarray import Dataset
 
-CRITERIA: Final[dict[str, type[Criterion]]] = {
-    kind.__name__: kind
-    for kind in (LeastMargin, MaximumSag, PositionError, LeastStiffness, LeastFrequency, Clearance, InFrame)
-}
+_CRITERIA: Final = (
+    "LeastMargin",
+    "MaximumSag",
+    "PositionError",
+    "LeastStiffness",
+    "LeastFrequency",
+    "Clearance",
+    "InFrame",
+)
+CRITERIA: Final[dict[str, type[Criterion]]] = {name: getattr(criteria, name) for name in _CRITERIA}
 NODES: Final = ("x", "y", "z")  # coordinates of the nodes of the grid
 FINE: Final = ("fine_x", "fine_y", "fine_z")  # coordinates of the finer grid that separates components
 
+ACCELERATION: Final = ("acceleration_part",)
 QUANTITIES: Final = (
     *(Quantity(name, (name,), "m", f"{name} of the nodes of the grid") for name in NODES),
     Quantity("level", NODES, "1", "least value of the criteria over their scales, >= 0 inside", infinite=True),
     Quantity("vertex_position", ("vertex", "axis"), "m", "vertices of the surface", "surface.vertices"),
     Quantity("face", ("side", "corner"), "", "vertices of each triangle, outward", "surface.faces", values=int),
-    Quantity("limiting", ("vertex",), "", "criterion that decides there, -1 for the box", values=int),
-    Quantity("limiting_cable", ("vertex",), "", "cable that decides, -1 for none", values=int),
-    Quantity("margin", ("vertex",), "N", "margin of the loads there", infinite=True),
-    Quantity("component_volume", ("component",), "", "of each component, in units of volume", "components.volume"),
+    Quantity("limiting", ("vertex",), "", "limiting criterion at the vertex, -1 for the box", values=int),
+    Quantity("limiting_cable", ("vertex",), "", "limiting cable at the vertex, -1 for none", values=int),
+    Quantity("margin", ("vertex",), "N", "margin of the loads at the vertex", infinite=True),
+    Quantity("component_volume", ("component",), "", "volume of each component, in volume_units", "components.volume"),
     Quantity("vertex_component", ("vertex",), "", "component of each vertex", "components.vertices", values=int),
-    *(Quantity(fine, (fine,), "m", f"{fine[-1]} of finer nodes", f"components.{fine[-1]}") for fine in FINE),
-    Quantity("component_nodes", FINE, "", "component of each node, -1 outside", "components.nodes", values=int),
-    Quantity("component_separate", ("component",), "", "proof of no path", "components.separate", values=bool),
-    Quantity("rotation", ("turn", "quaternion_part"), "1", "rotations of the platform", "orientations.quaternion"),
-    Quantity("wrench_center", ("wrench_part",), "N, N m", "a wrench of the set", "wrenches.center"),
-    Quantity("wrench_segment", ("segment", "wrench_part"), "N, N m", "half of each segment", "wrenches.segments"),
-    Quantity("wrench_ellipsoid", ("ellipsoid", "wrench_part", "column"), "N, N m", "semi-axes", "wrenches.ellipsoids"),
-    Quantity("corner_wrench", ("polytope_corner", "wrench_part"), "N, N m", "corners of polytopes", "wrenches.corners"),
-    Quantity("polytope_size", ("polytope",), "", "corners of each polytope", "wrenches.sizes", values=int),
+    *(Quantity(fine, (fine,), "m", f"{fine[-1]} of the finer nodes", f"components.{fine[-1]}") for fine in FINE),
+    Quantity("component_nodes", FINE, "", "component of each finer node, -1 outside", "components.nodes", values=int),
     Quantity(
-        "largest_acceleration",
-        ("acceleration_part",),
-        "m/s2, rad/s2",
-        "largest accelerations",
-        "wrenches.accelerations",
+        "component_separate",
+        ("component",),
+        "",
+        "true if the component is proved to be separate",
+        "components.separate",
+        values=bool,
     ),
+    Quantity("rotation", ("turn", "quaternion_part"), "1", "rotations of the platform", "orientations.quaternion"),
+    Quantity("wrench_center", ("wrench_part",), "N, N m", "center of the wrench set", "wrenches.center"),
+    Quantity(
+        "wrench_segment", ("segment", "wrench_part"), "N, N m", "half vector of each segment", "wrenches.segments"
+    ),
+    Quantity(
+        "wrench_ellipsoid",
+        ("ellipsoid", "wrench_part", "column"),
+        "N, N m",
+        "semi-axes of each ellipsoid",
+        "wrenches.ellipsoids",
+    ),
+    Quantity("corner_wrench", ("polytope_corner", "wrench_part"), "N, N m", "corners of polytopes", "wrenches.corners"),
+    Quantity("polytope_size", ("polytope",), "", "number of corners of each polytope", "wrenches.sizes", values=int),
+    Quantity("largest_acceleration", ACCELERATION, "m/s2, rad/s2", "largest accelerations", "wrenches.accelerations"),
 )
-
-
 UNITS = ("m³", "m²")
 KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Capsule, Sphere, Mesh)}
 
@@ -88,10 +94,10 @@ def _check_workspace(data: Dataset, cables: int) -> None:
         number(data.attrs[name], name, "", low=0.0)
     sizes = {str(name): size for name, size in data.sizes.items()} | {"corner": 3, "column": 6, "acceleration_part": 2}
     check_variables(data, QUANTITIES, sizes)
-    criteria = sum(f"criterion_{k}" in data.attrs for k in range(len(data.attrs)))
+    count = sum(f"criterion_{k}" in data.attrs for k in range(len(data.attrs)))
     ranges = {
         "face": (0, sizes["vertex"]),
-        "limiting": (-1, criteria),
+        "limiting": (-1, count),
         "limiting_cable": (-1, cables),
         "vertex_component": (0, sizes["component"]),
         "component_nodes": (-1, sizes["component"]),
@@ -99,17 +105,17 @@ def _check_workspace(data: Dataset, cables: int) -> None:
     check_indices(data, ranges)
 
 
-def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
+def _criteria_attributes(chosen: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Attributes of criteria, and variables of their obstacles. Raises InvalidValueError for unknown criteria."""
     attributes: dict[str, Any] = {}
     variables: dict[str, Any] = {}
-    for k, one in enumerate(criteria):
+    for k, one in enumerate(chosen):
         key = f"criterion_{k}"
         attributes |= choice_attributes(key, one, CRITERIA)
-        if isinstance(one, PositionError):
+        if isinstance(one, criteria.PositionError):
             del attributes[f"{key}_model"]
             attributes |= choice_attributes(f"{key}_of_model", one.model, MODELS)
-        if isinstance(one, Clearance):
+        if isinstance(one, criteria.Clearance):
             obstacles: Any = one.obstacles  # after the check, this is a tuple
             attributes[f"{key}_obstacles"] = len(obstacles)
             for j, obstacle in enumerate(obstacles):
@@ -124,9 +130,9 @@ def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
     found: list[Criterion] = []
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
-        if data.attrs[key] == PositionError.__name__:
+        if data.attrs[key] == criteria.PositionError.__name__:
             known["model"] = choice_of(path, data.attrs, f"{key}_of_model", MODELS)
-        if data.attrs[key] == Clearance.__name__:
+        if data.attrs[key] == criteria.Clearance.__name__:
             count = int(data.attrs[f"{key}_obstacles"])
             known["obstacles"] = tuple(_obstacle_of(data, f"{key}_obstacle_{j}") for j in range(count))
         found.append(choice_of(path, data.attrs, key, CRITERIA, **known))
@@ -196,9 +202,9 @@ def _pack(space: Workspace) -> Dataset:
         said = {"position": near.pose.position.tolist(), "quaternion": near.pose.quaternion.tolist()}
         said |= {name: getattr(near, name) for name in ("level", "margin", "criterion", "cables", "reason")}
         attributes["nearest"] = json.dumps(said)
-    criteria, obstacles = _criteria_attributes(space.criteria)
+    of_criteria, obstacles = _criteria_attributes(space.criteria)
     variables = variables_of_result(space, QUANTITIES) | obstacles
-    return FORMAT.dataset(f"Workspace of {space.robot.name}", space.robot, attributes | criteria, variables)
+    return FORMAT.dataset(f"Workspace of {space.robot.name}", space.robot, attributes | of_criteria, variables)
 
 
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
@@ -249,8 +255,8 @@ def field_of(space: Workspace) -> Dataset:
     about = {
         "level": {"units": "1", "long_name": "least value of the criteria over their scales, >= 0 inside"},
         "margin": {"units": "N", "long_name": "margin of the loads"},
-        "criterion": {"long_name": f"criterion that decides ({titles})"},
-        "cable": {"long_name": "cable that decides, -1 for none"},
+        "criterion": {"long_name": f"limiting criterion ({titles})"},
+        "cable": {"long_name": "limiting cable, -1 for none"},
     }
     values = {name: (("x", "y", "z"), getattr(found, name).reshape(shape), about[name]) for name in about}
     axes = {name: (name, axis, {"units": "m"}) for name, axis in zip("xyz", space.axes, strict=True)}

@@ -18,7 +18,7 @@ from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.folder import open_record
 from sagline.optimization.free import Free
 from sagline.optimization.front import Front, Ledger
-from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, Goal, checked_request, poses_of
+from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, Goal, Request, poses_of
 from sagline.optimization.search import SEARCHES, latin_hypercube, population_of
 from sagline.robot.pose import PoseBox, PoseLike
 from sagline.robot.robot import Robot
@@ -95,7 +95,7 @@ def design(
     """
     callback(progress, "progress")
     places = poses_of(instance(robot, Robot, "robot"), poses, box, grid)
-    request = checked_request(robot, free, goals, wrenches, places, model, inner, robust, optimizer, seed)
+    request = Request(robot, free, goals, wrenches, places, model, inner, robust, optimizer, seed)
     candidates = request.candidates
     dimensions = len(candidates.parts)
     population = population_of(optimizer, dimensions)

@@ -15,15 +15,8 @@ from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import set_fields
 from sagline.kernels import tables
-from sagline.optimization.free import (
-    Bound,
-    DesignVariable,
-    Free,
-    cable_numbers,
-    cables_of_robot,
-    check_order,
-    whose_text,
-)
+from sagline.optimization import free
+from sagline.optimization.free import Bound
 from sagline.robot.robot import Robot
 
 Symmetry: TypeAlias = str
@@ -95,7 +88,7 @@ _AXES: Final = "xyz"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FreeAnchors(Free):
+class FreeAnchors(free.Free):
     """Variable shifts of anchors from their positions in the robot; the shifts are in a box or along lines.
 
     The dead length of guides is constant during the search; the resulting robots have the correct dead length.
@@ -150,28 +143,28 @@ class FreeAnchors(Free):
         """
         directions = np.eye(3) if along is None else _directions(along)
         lower, upper = (_shifts(value, name, len(directions)) for value, name in ((low, "low"), (high, "high")))
-        check_order(lower, upper, "m")
+        free.check_order(lower, upper, "m")
         for k in np.flatnonzero((lower > 0.0) | (upper < 0.0)):
             step = "Give low <= 0 <= high, because shifts are relative to the robot's anchors."
             raise InvalidValueError(f"low[{k}] to high[{k}]", f"{lower[k]:g} to {upper[k]:g} m", "0 m inside", step)
         if not (upper > lower).any():
             raise InvalidValueError("high", "the same as low", "> low in a direction", "Widen the bounds.")
-        free = upper > lower
+        moving = upper > lower
         set_fields(
             self,
             end=choice(end, "end", ENDS),
-            low=locked(lower[free]),
-            high=locked(upper[free]),
-            along=locked(directions[free]),
-            cables=cable_numbers(cables),
+            low=locked(lower[moving]),
+            high=locked(upper[moving]),
+            along=locked(directions[moving]),
+            cables=free.cable_numbers(cables),
             symmetry=None if symmetry is None else str(choice(symmetry, "symmetry", NAMES)),
         )
 
     def bound(self, robot: Robot, item: str) -> Bound:
         """Design variables of this part, for a given robot."""
-        cables = cables_of_robot(self.cables, robot, f"{item}: cables")
+        cables = free.cables_of_robot(self.cables, robot, f"{item}: cables")
         anchors = robot.frame_anchors if self.end == "frame" else robot.platform_anchors
-        parts: list[DesignVariable] = []
+        parts: list[free.DesignVariable] = []
         rates: list[Array] = []
         names = _direction_names(self.along)
         shifts = _symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
@@ -182,8 +175,8 @@ class FreeAnchors(Free):
                 if np.abs(rate).max() == 0.0:
                     continue
                 whose = cables if which is None else cables[which : which + 1]
-                named = f"{self.end}_anchors{whose_text(whose, robot.cable_count)} {name}"
-                parts.append(DesignVariable(named, "m", float(self.low[k]), float(self.high[k]), 0.0))
+                named = f"{self.end}_anchors{free.whose_text(whose, robot.cable_count)} {name}"
+                parts.append(free.DesignVariable(named, "m", float(self.low[k]), float(self.high[k]), 0.0))
                 rates.append(rate)
         if not parts:
             step = "Omit the symmetry, or the directions across its planes."

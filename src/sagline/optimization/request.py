@@ -9,12 +9,14 @@ from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from attrs import field, frozen
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import model_of
 from sagline.core.arguments import brief, choice, elements, instance, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import check_fields, checked_by
 from sagline.core.results import set_fields
 from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBox, free_parts
 from sagline.optimization.free import Free
@@ -80,94 +82,19 @@ MOST_EVALUATIONS: Final = 10_000_000
 _SEED: Final = 2**31 - 1  # largest seed that all optimizers accept
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Request:
-    """A design search, without its number of evaluations.
-
-    Attributes:
-        robot: Initial robot of the search.
-        free: Design variables.
-        goals: Goals.
-        wrenches: Set of loads; None for the weight alone.
-        poses: Poses, a batch.
-        model: Cable model.
-        inner: Anchors that the machine moves from pose to pose.
-        robust: Errors of the anchors, or None.
-        optimizer: Name of the optimizer.
-        seed: Seed of all random numbers.
-    """
-
-    robot: Robot
-    free: tuple[Free, ...]
-    goals: tuple[Goal, ...]
-    wrenches: WrenchSet | None
-    poses: Pose
-    model: CableModel
-    inner: tuple[Free, ...]
-    robust: AnchorErrors | None
-    optimizer: str
-    seed: int
-
-    @property
-    def candidates(self) -> Candidates:
-        """The candidates of the search."""
-        return Candidates(self.robot, self.free)
-
-
-def checked_request(
-    robot: Any, free: Any, goals: Any, wrenches: Any, poses: Pose, model: Any, inner: Any, robust: Any,
-    optimizer: Any, seed: Any,
-) -> Request:  # fmt: skip
-    """Make a request from the arguments of `design`, which are checked."""
-    optional(wrenches, WrenchSet, "wrenches")
-    request = Request(
-        instance(robot, Robot, "robot"),
-        free_parts(free, "free"),
-        _goals(goals),
-        wrenches,
-        poses,
-        model_of(model),
-        free_parts(inner, "inner"),
-        optional(robust, AnchorErrors, "robust"),
-        str(choice(optimizer, "optimizer", SEARCHES)),
-        whole_number(seed, "seed", 0, _SEED),
-    )
-    if not request.free:
-        step = "Give design variables; for moving anchors alone, call moving_anchors."
-        raise InvalidValueError("free", "empty", "FreeAnchors, FreeCable or FreeLimit", step)
-    for k, one in enumerate(request.inner):
-        if not isinstance(one, FreeAnchors):
-            raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Give only anchors that move.")
-    if request.inner and not any(goal.needs == "margin" for goal in request.goals):
-        step = "Add Goal('mean_margin'), because anchors move to the largest margin."
-        raise InvalidValueError("inner", "given without a goal about margins", "given with a goal about margins", step)
-    if request.optimizer == "nsga2":
-        _refuse_weights(request.goals)
-    _check_platform(request)
-    return request
-
-
-def _goals(given: Any) -> tuple[Goal, ...]:
+def _goals(given: Any, item: str) -> tuple[Goal, ...]:
     """Checked goals; a name is replaced by the goal with this name."""
     many = [given] if isinstance(given, Goal | str) else given
     if not isinstance(many, Sequence) or not many:
         step = 'Give [Goal("workspace_share")] for instance.'
-        raise InvalidValueError("goals", brief(given), "one goal or more", step)
+        raise InvalidValueError(item, brief(given), "one goal or more", step)
     goals = tuple(
-        Goal(one) if isinstance(one, str) else instance(one, Goal, f"goals[{k}]") for k, one in enumerate(many)
+        Goal(one) if isinstance(one, str) else instance(one, Goal, f"{item}[{k}]") for k, one in enumerate(many)
     )
     kinds = [goal.kind for goal in goals]
     if twice := [kind for kind in kinds if kinds.count(kind) > 1]:
-        raise InvalidValueError("goals", f"with {twice[0]} twice", "each once", "Leave one of them out.")
+        raise InvalidValueError(item, f"with {twice[0]} twice", "each once", "Leave one of them out.")
     return goals
-
-
-def _refuse_weights(goals: tuple[Goal, ...]) -> None:
-    for goal in goals:
-        if goal.weight != 1.0:
-            step = 'Omit the weight, or choose the optimizer "cma".'
-            allowed = "1, because a front of robots has no weights"
-            raise InvalidValueError(f"weight of {goal.kind}", f"{goal.weight:g}", allowed, step)
 
 
 def _check_platform(request: Request) -> None:
@@ -287,3 +214,63 @@ class Goal:
         if not worst:
             return np.asarray(samples.mean(axis=-1))
         return np.asarray(samples.min(axis=-1) if self.maximize else samples.max(axis=-1))
+
+
+def _given(value: Any) -> Any:
+    """Return a value unchanged. This converter gives type checkers the type of the argument."""
+    return value
+
+
+@frozen(eq=False, weakref_slot=False)
+class Request:
+    """A design search, without its number of evaluations. The constructor checks the arguments of `design`.
+
+    Attributes:
+        robot: Initial robot of the search.
+        free: Design variables.
+        goals: Goals.
+        wrenches: Set of loads; None for the weight alone.
+        poses: Poses, a batch.
+        model: Cable model.
+        inner: Anchors that the machine moves from pose to pose.
+        robust: Errors of the anchors, or None.
+        optimizer: Name of the optimizer.
+        seed: Seed of all random numbers.
+    """
+
+    robot: Robot = field(metadata=checked_by(lambda value, item: instance(value, Robot, item)))
+    free: tuple[Free, ...] = field(converter=_given, metadata=checked_by(free_parts))
+    goals: tuple[Goal, ...] = field(converter=_given, metadata=checked_by(_goals))
+    wrenches: WrenchSet | None = field(metadata=checked_by(lambda value, item: optional(value, WrenchSet, item)))
+    poses: Pose
+    model: CableModel = field(converter=_given, metadata=checked_by(lambda value, _: model_of(value)))
+    inner: tuple[Free, ...] = field(converter=_given, metadata=checked_by(free_parts))
+    robust: AnchorErrors | None = field(metadata=checked_by(lambda value, item: optional(value, AnchorErrors, item)))
+    optimizer: str = field(metadata=checked_by(lambda value, item: str(choice(value, item, SEARCHES))))
+    seed: int = field(metadata=checked_by(whole_number, 0, _SEED))
+
+    def __attrs_post_init__(self) -> None:
+        """Check the arguments, one by one and then together."""
+        check_fields(self)
+        if not self.free:
+            step = "Give design variables; for moving anchors alone, call moving_anchors."
+            raise InvalidValueError("free", "empty", "FreeAnchors, FreeCable or FreeLimit", step)
+        for k, one in enumerate(self.inner):
+            if not isinstance(one, FreeAnchors):
+                raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Give only anchors that move.")
+        if self.inner and not any(goal.needs == "margin" for goal in self.goals):
+            step = "Add Goal('mean_margin'), because anchors move to the largest margin."
+            raise InvalidValueError(
+                "inner", "given without a goal about margins", "given with a goal about margins", step
+            )
+        for goal in self.goals if self.optimizer == "nsga2" else ():
+            if goal.weight != 1.0:
+                step = 'Omit the weight, or choose the optimizer "cma".'
+                allowed = "1, because a front of robots has no weights"
+                raise InvalidValueError(f"weight of {goal.kind}", f"{goal.weight:g}", allowed, step)
+        _check_platform(self)
+
+    @property
+    def candidates(self) -> Candidates:
+        """The candidates of the search."""
+        return Candidates(self.robot, self.free)

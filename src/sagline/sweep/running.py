@@ -13,6 +13,7 @@ import uuid
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -203,11 +204,7 @@ def cores() -> int:
 def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
     """Start worker processes that only this computer can reach; `tell` is called with the dashboard's address."""
     with _silence_dask():
-        import dask.config
-        import distributed
-
-        api: Any = distributed  # Any, because the package is only partly typed
-        settings: Any = dask.config
+        distributed, settings = import_module("distributed"), import_module("dask.config")
         free = _is_free(DASHBOARD)
         given: dict[str, Any] = {
             "n_workers": workers,
@@ -221,11 +218,11 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
         }
         try:
             with settings.set(SETTINGS):
-                cluster = api.LocalCluster(**given)
+                cluster = distributed.LocalCluster(**given)
         except (RuntimeError, OSError, TimeoutError) as error:
             step = 'In a script, the call of run must be below the line if __name__ == "__main__":'
             raise SaglineError(f"The workers could not be started ({_first_line(error)}). {step}") from None
-        with cluster, api.Client(cluster, set_as_default=False) as client:
+        with cluster, distributed.Client(cluster, set_as_default=False) as client:
             taken = "" if free else f"; port {DASHBOARD} is taken"
             tell(f"Dashboard: {cluster.dashboard_link}{taken}")
             yield client
@@ -237,12 +234,9 @@ def remote_workers(address: str) -> Iterator[Any]:
     check_address(address)
     check_package("distributed", "a scheduler")
     with _silence_dask():
-        import distributed
-
-        api: Any = distributed
-
+        distributed = import_module("distributed")
         try:
-            client = api.Client(address, timeout=PATIENCE, set_as_default=False)
+            client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, RuntimeError, MemoryError) as error:  # last: another program answers
             step = "Start a scheduler: dask scheduler; and workers: dask worker ADDRESS."
             raise SaglineError(f"No scheduler answers at {address} ({_first_line(error)}). {step}") from None
@@ -267,14 +261,11 @@ def check_address(address: object) -> str:
 
 def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
     """Run tasks on the workers, a few per worker at a time; after an error or Ctrl-C, wait for the running tasks."""
-    import distributed
-
-    api: Any = distributed
-
+    distributed = import_module("distributed")
     waiting = iter(numbers)
     run = uuid.uuid4().hex[:8]
     which: dict[Any, int] = {}
-    ahead = api.as_completed(loop=client.loop)
+    ahead = distributed.as_completed(loop=client.loop)
     width, looked = 0, -LOOK
 
     def send() -> None:
@@ -318,7 +309,7 @@ def _silence_dask() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
         if is_installed("distributed"):
-            import distributed  # noqa: F401 - the import configures the loggers, and must not follow the next lines
+            import_module("distributed")  # the import configures the loggers, and must not follow the next lines
         for logger in loggers:
             logger.setLevel(SILENT)
         yield
