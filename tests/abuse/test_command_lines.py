@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import sagline as sl
-from sagline.cli.examples import example_files
+from sagline.cli.installation import example_files
 from sagline.cli.main import app
 from sagline.plc.wire import addresses_of, groups_at
 from sagline.present.page import Chapter
@@ -62,10 +62,10 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shortened_commands(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long commands end after the check of their arguments, or do a small part of their work."""
     short = sl.load_path(stocked / "short.yaml")
-    monkeypatch.setattr("sagline.motion.rest_to_rest.article_path", lambda: short)
-    monkeypatch.setattr("sagline.cli.run.FIGURES", ())
-    monkeypatch.setattr("sagline.cli.run.CELLS", 4)
-    monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.article_path", lambda: short)
+    monkeypatch.setattr("sagline.cli.article.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.article.CELLS", 4)
+    monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
     monkeypatch.setattr("sagline.workspaces.levels._EVALUATIONS", 30)
     monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.output.Output.draw", lambda *_: None)

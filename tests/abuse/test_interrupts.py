@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from sagline.cli.examples import examples
+from sagline.cli.installation import examples
 from tests.cli.interrupts import heard
 from tests.tiers import extended
 

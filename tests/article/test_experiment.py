@@ -162,7 +162,7 @@ def test_the_loop_removes_zero_errors_from_tensions_without_motion() -> None:
 
 @pytest.mark.soak
 def test_the_experiment_runs_over_s7_in_real_time() -> None:
-    from sagline.cli.experiment import apart_over_s7
+    from sagline.cli.article import apart_over_s7
 
     begun = time.perf_counter()
     found = apart_over_s7(ROBOT, ROBOT, 1, lambda share: None)

@@ -1,6 +1,5 @@
 import json
 import re
-import sys
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
@@ -98,7 +97,7 @@ def test_a_doubtful_result_ends_with_1(
     status: sl.CalibrationStatus, run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     found = made_up(status=status)
-    monkeypatch.setattr(sys.modules[sl.calibrate.__module__], "calibrate", lambda *_, **__: found)
+    monkeypatch.setattr(sl, "calibrate", lambda *_, **__: found)
     result = run("robot.yaml", "winches.csv", "--out", str(tmp_path / "r.yaml"), "--out", str(tmp_path / "all.nc"))
     assert result.exit_code == 1
     assert status.text in result.stderr.replace("\n", " ")

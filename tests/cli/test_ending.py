@@ -28,7 +28,7 @@ def broken(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("sagline.files.robot_file.load_robot", fail)
+    monkeypatch.setattr("sagline.load_robot", fail)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_names_from_files_contain_no_terminal_commands(
         "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
     )
     plan = sl.inverse(robot, sl.load_path("short.yaml"))
-    monkeypatch.setattr("sagline.files.robot_file.load_robot", lambda _: robot)
+    monkeypatch.setattr("sagline.load_robot", lambda _: robot)
     header = ",".join(f"L{k}" for k in range(8))
     row = ",".join(f"{length:.6f}" for length in plan.unstrained_length[0])
     Path("lengths.csv").write_text(f"{header}\n{row}\n")

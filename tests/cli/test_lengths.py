@@ -8,7 +8,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.cli.lengths import write_rows
-from sagline.cli.study import ConfirmedRun, summary
+from sagline.cli.track import ConfirmedRun, summary
 from sagline.core.table import csv_text
 
 ROBOT = sl.load_robot("article-suspended").replace(winches=sl.Winch(pulley_radius=0.1, dead_cable=4.0))

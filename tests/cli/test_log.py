@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline import Plan
 from sagline.cli import view
-from sagline.cli.hosting import ServerAddress
 from sagline.cli.main import app
+from sagline.cli.view import ServerAddress
 from sagline.files.mcap_writer import Recorder
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.files.test_mcap import assert_same
@@ -119,7 +119,7 @@ def test_a_growing_log_is_awaited_until_its_first_bytes_exist(
             file.write_bytes(whole)
 
     monkeypatch.setattr(view.time, "sleep", sleep)  # type: ignore[attr-defined]
-    monkeypatch.setattr("sagline.cli.hosting.serve", lambda robot, address, *, played, **_: len(played.time))
+    monkeypatch.setattr("sagline.cli.view.serve", lambda robot, address, *, played, **_: len(played.time))
     assert view.view_log(log, None, NOWHERE, live=True, truth=log.parent / "twin.mcap") == 201
     assert looks == [view.LOOK] * 3
 
@@ -163,7 +163,7 @@ def test_a_log_is_followed_before_it_exists(tmp_path: Path, monkeypatch: pytest.
 
     plan_of()
     writer = threading.Thread(target=write)
-    monkeypatch.setattr("sagline.cli.hosting.serve", serve)
+    monkeypatch.setattr("sagline.cli.view.serve", serve)
     writer.start()
     assert view.view_log(file, None, NOWHERE, live=True) == 0
     writer.join()

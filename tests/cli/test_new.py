@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cables.cable import ROPES
 from sagline.cli.main import app
-from sagline.cli.new import ROPE_NAMES, grid
+from sagline.cli.new import GRID, ROPE_NAMES
+from sagline.cli.options import level_grid
 from sagline.robot.catalogue import Design
 from tests.tiers import extended
 
@@ -65,7 +66,7 @@ def test_the_recommended_box_is_feasible(folder: FilePath) -> None:
     assert new("mine.yaml").exit_code == 0
     robot = sl.load_robot(folder / "mine.yaml")
     assert robot.test_box is not None
-    assert sl.inverse(robot, grid(robot.test_box)).feasible.mean() >= 0.95
+    assert sl.inverse(robot, level_grid(robot.test_box, GRID)).feasible.mean() >= 0.95
 
 
 def test_the_end_of_the_input_is_an_error(folder: FilePath) -> None:
@@ -101,7 +102,7 @@ def test_every_layout_is_feasible_somewhere(layout: str, cables: int) -> None:
     design = Design("x", [6.0, 4.0, 3.0], [0.5, 0.5, 0.4], 30.0, diameter=0.004, cables=cables, layout=layout)
     robot = design.robot()
     assert robot.cable_count == cables
-    assert sl.inverse(robot, grid(design.placed(0.5))).feasible.mean() > 0.2
+    assert sl.inverse(robot, level_grid(design.placed(0.5), GRID)).feasible.mean() > 0.2
 
 
 def test_ropes_agree_with_the_table_of_a_manufacturer() -> None:

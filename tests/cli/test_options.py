@@ -42,7 +42,7 @@ def conversions() -> Iterator[tuple[str, str]]:
     """File and function of the conversion of each option."""
     for file in Path(sagline.cli.__file__).parent.glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "converted_option":
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "converted":
                 name = ast.literal_eval(node.args[2]) if isinstance(node.args[2], ast.Constant) else ""
                 yield file.name, name
 
@@ -239,8 +239,8 @@ def test_a_verdict_is_the_first_line(line: str, folder: Path) -> None:
 
 @extended
 def test_run_draws_and_writes_only_on_request(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sagline.motion.rest_to_rest.article_path", lambda: sl.load_path("path.yaml"))
-    monkeypatch.setattr("sagline.cli.run.CELLS", 4)
+    monkeypatch.setattr("sagline.article_path", lambda: sl.load_path("path.yaml"))
+    monkeypatch.setattr("sagline.cli.article.CELLS", 4)
     assert sagline_("run", "--no-figures", "--csv").exit_code == 0
     kinds = {Path(name).suffix for name in names_in(folder)}
     assert kinds == {".nc", ".csv", ".glb"}

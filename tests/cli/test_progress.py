@@ -6,7 +6,7 @@ from io import StringIO
 
 from rich.console import Console
 
-from sagline.cli.progress import progress_line
+from sagline.cli.terminal import progress_line
 
 
 def test_a_bar_appears_on_a_terminal_when_work_takes_long() -> None:

@@ -8,7 +8,7 @@ from typer.testing import CliRunner, Result
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.share import calls
+from sagline.share import packing
 from tests.files.executions import execution
 from tests.tiers import extended
 
@@ -63,7 +63,7 @@ def test_a_default_name_does_not_replace_another_page(folder: Path) -> None:
 
 
 def test_without_the_module_one_line_gives_the_next_step(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calls, "MODULE", folder / "kernels.wasm")
+    monkeypatch.setattr(packing, "MODULE", folder / "kernels.wasm")
     result = shared("no-such-robot")
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1

@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
+from sagline.cli.control import TwinMonitor
 from sagline.cli.main import app
-from sagline.cli.twin import TwinMonitor
 from sagline.files.mcap_reader import read_log
 from sagline.files.mcap_writer import Recorder
 from sagline.twin import Machine, Server

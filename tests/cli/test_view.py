@@ -77,7 +77,7 @@ def test_the_printed_address_has_the_token_and_the_browser_starts_with_another(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("sagline.viewer.page.Page.serve", serve)
-    monkeypatch.setattr("sagline.cli.hosting._has_display", lambda: True)
+    monkeypatch.setattr("sagline.cli.view._has_display", lambda: True)
     monkeypatch.setattr("webbrowser.open", opened.append)
     result = CliRunner().invoke(app, ["view", "article-suspended", "--port", "0", *words])
     found = re.search(rf"(http://[\w.]+:\d+)({path})   ", result.stdout)

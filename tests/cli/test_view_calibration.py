@@ -29,7 +29,7 @@ def test_a_calibration_is_shown_with_its_robot(words: list[str], folder: Path, m
         return 0
 
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("sagline.cli.hosting.serve", serve)
+    monkeypatch.setattr("sagline.cli.view.serve", serve)
     result = CliRunner().invoke(app, ["view", *words, "--no-browser"])
     assert result.exit_code == 0, result.output
     [(machine, played, found)] = shown

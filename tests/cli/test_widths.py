@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli import terminal
-from sagline.cli.examples import examples
+from sagline.cli.installation import examples
 from sagline.cli.main import GROUPS, app
 from sagline.cli.output import TextTable
 from tests.abuse.command_lines import LINES
@@ -84,17 +84,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("sagline.motion.rest_to_rest.article_path", lambda: sl.load_path("short.yaml"))
-    monkeypatch.setattr("sagline.cli.run.FIGURES", ())
-    monkeypatch.setattr("sagline.cli.run.CELLS", 4)
-    monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
-    monkeypatch.setattr("sagline.cli.study.perf_counter", iter(range(1000)).__next__)  # each run takes a second
+    monkeypatch.setattr("sagline.article_path", lambda: sl.load_path("short.yaml"))
+    monkeypatch.setattr("sagline.cli.article.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.article.CELLS", 4)
+    monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.cli.track.perf_counter", iter(range(1000)).__next__)  # each run takes a second
 
 
 def printed(words: list[str], width: int | None, monkeypatch: pytest.MonkeyPatch) -> str:
     """Output of a command on a terminal with a width, or in a pipe for None."""
     with monkeypatch.context() as patched:
-        patched.setattr("sagline.cli.study.perf_counter", iter(range(1000)).__next__)
+        patched.setattr("sagline.cli.track.perf_counter", iter(range(1000)).__next__)
         if width is not None:
             patched.setattr(terminal, "_out", Console(force_terminal=True, width=width, markup=False, emoji=False))
             patched.setattr(terminal, "_err", Console(stderr=True, width=width, markup=False, emoji=False))

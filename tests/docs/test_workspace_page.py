@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import sagline as sl
-from sagline.cli.run import CELLS, ROBOTS
+from sagline.cli.article import CELLS, ROBOTS
 from sagline.workspaces.boundary import boundary
 from tests.tiers import extended
 from tests.workspaces.levels import ipanema, level_of

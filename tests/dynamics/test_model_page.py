@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import sagline as sl
-from sagline.dynamics.simulation.chains_at_rest import chains_at_rest
+from sagline.dynamics.simulation.chain_plant import chains_at_rest
 from tests.dynamics.simulation.test_chains import cogiro, moved
 from tests.tiers import extended
 
@@ -23,8 +23,8 @@ def page() -> str:
     return " ".join(PAGE.read_text(encoding="utf-8").split())
 
 
-def test_rest_position_error_of_a_chain_of_twenty_elements() -> None:
-    off = chains_at_rest(cogiro(), 20).pose.position - cogiro().pose.position
+def test_how_far_off_a_chain_of_twenty_elements_rests() -> None:
+    off = chains_at_rest(cogiro(), 20)[0].position - cogiro().pose.position
     assert f"For CoGiRo with 20 elements the difference is {1e6 * np.linalg.norm(off):.1f} µm." in page()
 
 

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.cli.examples import KINDS, example_files
+from sagline.cli.installation import KINDS, example_files
 from sagline.cli.main import app
 from sagline.files.mcap_reader import read_log
 from sagline.files.mcap_writer import Recorder
@@ -132,9 +132,9 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.view.view_calibration", serve_found)
     monkeypatch.setattr("sagline.cli.view.view_log", serve_log)
     monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
-    monkeypatch.setattr("sagline.cli.run.FIGURES", ())
-    monkeypatch.setattr("sagline.cli.run.CELLS", 4)
-    monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.cli.article.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.article.CELLS", 4)
+    monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
     monkeypatch.setattr("sagline.plot.sheet.RESOLUTION", 50)  # dots per inch: a coarse picture saves time
     instead_of_machines(monkeypatch)
     if words[0] == "twin":
@@ -192,7 +192,7 @@ def test_an_installed_package_contains_the_examples(tmp_path: Path) -> None:
     package = Path(sl.__file__).parent
     shutil.copytree(package, tmp_path / "sagline", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(ROOT / "examples", tmp_path / "sagline" / "examples")
-    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from sagline.cli.examples import example_files; "
+    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from sagline.cli.installation import example_files; "
     code += "print(*example_files(), sep='\\n')"
     done = subprocess.run([sys.executable, "-I", "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
     found = [Path(line) for line in done.stdout.splitlines()]

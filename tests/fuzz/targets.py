@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import sagline as sl
-from sagline.cli.cache import cache
+from sagline.cli.installation import cache
 from sagline.files.execution_file import save_execution
 from sagline.kernels.sources import SUFFIX
 from sagline.sweep.file import load_sweep

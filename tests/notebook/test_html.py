@@ -16,7 +16,8 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.notebook import figures, html
+import sagline.notebook
+from sagline.notebook import figures
 from sagline.notebook.figures import LARGEST
 from sagline.present.summaries import summary_of
 from tests.calibration.made_up import made_up
@@ -193,7 +194,7 @@ def test_results_without_a_summary_have_their_ordinary_text(monkeypatch: pytest.
     def fails(thing: object) -> None:
         raise RuntimeError("broken")
 
-    monkeypatch.setattr(html, "summary_of", fails)
+    monkeypatch.setattr(sagline.notebook, "summary_of", fails)
     assert made.plan()._repr_html_() is None  # Jupyter then shows repr()
     monkeypatch.undo()
     assert made.plan().state.cables._repr_html_() is None

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.core.arrays import Array
-from sagline.share.calls import module_text
+from sagline.share.packing import module_text
 from tools.translate import wasm
 
 SCRIPTS: Final = ("kernels.js", "robot.js")

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.robot.reach import bounds
-from sagline.share.calls import MODULE
 from sagline.share.machine import courses_at, model_data
+from sagline.share.packing import MODULE
 from sagline.statics.tables import chord_geometry, pose_rows
 from sagline.viewer.snapshot import Snapshot
 from tests.share.programs import Rows, compiled_kernels, in_node, in_program, linked_program, patterns

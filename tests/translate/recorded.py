@@ -20,7 +20,7 @@ import numpy as np
 
 import sagline
 from sagline.kernels import jit
-from sagline.share.calls import described_calls
+from sagline.share.packing import described_calls
 from tests.share.programs import in_node
 from tests.translate.library import Entry, copied
 from tools.translate import wasm

@@ -16,7 +16,7 @@ from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel, CableState
 from sagline.cables.models import Catenary, Empirical
 from sagline.kernels.cable.batch import BUFFERS, CHUNK
-from sagline.share.calls import Call, described_calls, module_text
+from sagline.share.packing import Call, described_calls, module_text
 
 KERNELS: Final = Path(__file__).parents[2] / "src/sagline/share/page/kernels.js"
 MARK: Final = re.compile(r"^<!-- one cable, (.+) -->$", re.MULTILINE)

@@ -1,27 +1,104 @@
-"""`sagline article`: a page that reproduces the article's studies, figures and tables."""
+"""`sagline run`, `article` and `experiment`: the article's test, studies and experiment."""
 
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import closing
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.options import JsonOption, OutOption, argument
-from sagline.cli.output import Output
-from sagline.cli.terminal import show_json, show_note, working
+import numpy as np
+
+import sagline as sl
+from sagline.cli import options as opt
+from sagline.cli.output import FigureMaker, Output, TextTable, number_text, show_table
+from sagline.cli.terminal import show_json, show_note, show_text, working
+from sagline.cli.track import ConfirmedRun, run_along, run_name, tell
+from sagline.core.errors import nearest
+from sagline.core.numbers import n
+
+if TYPE_CHECKING:
+    from sagline.article.experiment import Experiment, Tell
+
+ROBOTS = ("article-suspended", "article-mixed")
+FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
+HULLS = ("hull-suspended", "hull-mixed")  # the article names workspaces with sag as future work
+CELLS = (
+    20  # cells along the longest edge of the frame: this takes half a second per robot, and volumes are within 0.2 %
+)
+
+
+def run(
+    folder: opt.OutOption = Path("output"),
+    figures: opt.FiguresOption = True,
+    formats: opt.FormatsOption = opt.USUAL_FORMATS,
+    style: opt.StyleOption = opt.FigureStyle.PLAIN,
+    table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
+) -> int:
+    """Run the article's test: two simulated robots, the empirical and the exact cable model, figures 18 to 22.
+
+    The tension distribution has the least norm of the horizontal tensions T_x, as in the article's figures.
+    """
+    from sagline.workspaces.workspace import amount_of
+
+    models = sl.Empirical(), sl.Catenary()
+    # The article's equation (55) selects the tensions closest to the previous ones. However, its figures show lower
+    # cables near their minimum tension, and curves that return to their start. Both mean the minimum norm of T_x.
+    tension = sl.MinimumNorm("horizontal")
+    robots = [sl.load_robot(name) for name in ROBOTS]
+    plans = [run_name(robot, model) for robot in robots for model in models]
+    files = [f"{name}.{kind}" for name in plans for kind in ("nc", *["csv"] * table)]
+    drawn = [*FIGURES, *HULLS] if figures else []
+    output = Output(folder, "", [*files, *(f"{name}.glb" for name in HULLS)], drawn, formats, style)
+    path, runs = sl.article_path(), []
+    with working("planning the article's path, and confirming it with exact cables") as line:
+        for robot in robots:
+            runs += [run_along(robot, path, model, tension, line) for model in models]
+    with working("workspaces of both robots") as line:
+        spaces = [sl.workspace(robot, cells=CELLS, progress=line.progress) for robot in robots]
+    with working("writing runs, hulls and figures"):
+        for name, run in zip(plans, runs, strict=True):
+            run.plan.save(output.file(f"{name}.nc"))
+            if table:
+                output.table(f"{name}.csv", run.plan.table().rows)
+        if figures:
+            empirical = (run for run in runs if isinstance(run.plan.state.cables.model, sl.Empirical))
+            output.draw(*_figures(*empirical), *(partial(sl.plot.workspace, space) for space in spaces))
+        for name, space in zip(HULLS, spaces, strict=True):
+            space.surface.export(output.file(f"{name}.glb"))
+    notes = [f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions."]
+    for space in spaces:
+        name, mass = space.robot.name, space.robot.mass
+        notes.append(f"The workspace of {name} in its frame is {amount_of(space)}, level, with its {mass:g} kg.")
+    return tell(runs, output, notes, as_json=as_json)
+
+
+def _figures(suspended: ConfirmedRun, mixed: ConfirmedRun) -> tuple[FigureMaker, ...]:
+    """The article's figures 18 to 22, computed with the article's cable model, in the order of FIGURES."""
+    path = suspended.plan.path
+    assert path is not None
+    return (
+        lambda: sl.plot.path(path),
+        lambda: sl.plot.velocity(path),
+        lambda: sl.plot.overview(suspended.plan),
+        lambda: sl.plot.overview(mixed.plan),
+        lambda: sl.plot.errors(suspended.confirmation, mixed.confirmation),
+    )
 
 
 def article(
     parts: Annotated[
         list[str] | None,
-        argument(
+        opt.argument(
             "PART",
             "figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, "
             "simulation, poses, workspace, errata. Default: everything.",
         ),
     ] = None,
-    folder: OutOption = Path("output"),
-    as_json: JsonOption = False,
+    folder: opt.OutOption = Path("output"),
+    as_json: opt.JsonOption = False,
 ) -> None:
     """Reproduce the article's figures, tables and errata, as one page that compares the article with computed values.
 
@@ -50,3 +127,109 @@ def article(
     verdicts = Counter(finding.verdict for chapter in report.chapters for finding in chapter.findings)
     show_note("", ", ".join(f"{count} × {verdict}" for verdict, count in verdicts.items()))
     show_note("", f"The report: {report.page.resolve()}; its numbers: {report.data.name}")
+
+
+KNOWN: Final = ("article",)
+TABLE: Final = "experiment.csv"
+PARTS: Final = 1000  # steps of the progress bar
+
+
+def experiment(
+    name: Annotated[str, opt.argument("NAME", "article: ten points, Table 2 and figures 25-27.")],
+    waits: Annotated[
+        bool, opt.flag("Run without real time and network, in half a minute instead of 14 minutes.", "--in-process")
+    ] = False,
+    true: opt.TrueOption = None,
+    seed: opt.SeedOption = 1,
+    folder: opt.OutOption = Path("output"),
+    write_table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
+) -> None:
+    """Repeat the article's experiment (home, the ten points of Table 2, home) as one page that compares the numbers.
+
+    The controller drives a twin of the prototype in another process, over S7 and in real time; this takes 14 minutes.
+    The page is DIR/experiment.html and needs no other file. The numbers are in DIR/experiment.json.
+
+    For example:
+
+        sagline experiment article --in-process
+        sagline experiment article
+        sagline experiment article --in-process --true worn.yaml --out worn
+    """
+    from sagline.article.experiment import PROTOTYPE, in_process
+    from sagline.article.experiment_page import NAMES, experiment_chapter, write_experiment
+    from sagline.files.writing import plain
+
+    if name not in KNOWN:
+        near = nearest(name, KNOWN)
+        raise sl.InvalidValueError("experiment", repr(name), ", ".join(KNOWN), f"Did you mean {near or KNOWN[0]}?")
+    nominal = sl.load_robot(PROTOTYPE)
+    real = nominal if true is None else sl.load_robot(true)
+    if real.cable_count != nominal.cable_count:
+        step = "Begin a robot file with base: article-prototype, and give the values that differ from it."
+        raise sl.InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
+    output = Output(folder, "", [*NAMES, *[TABLE] * write_table])
+    how = _how(None if true is None else real.name, waits)
+    with working("home, ten points, home") as line:
+
+        def tell(share: float) -> None:
+            line.progress(round(PARTS * share), PARTS)
+
+        result = in_process(real, nominal, seed=seed, tell=tell) if waits else apart_over_s7(real, nominal, seed, tell)
+    place = write_experiment(result, folder, how)
+    if write_table:
+        output.table(TABLE, _rows(result))
+    if as_json:
+        show_json({finding.key: plain(finding.numbers) for finding in experiment_chapter(result, how).findings})
+        return
+    _tell(result)
+    show_note("", f"The report: {place.resolve()}; its numbers: {NAMES[1]}")
+
+
+def apart_over_s7(true: sl.Robot, nominal: sl.Robot, seed: int, tell: Tell) -> Experiment:
+    """Drive a twin in another process, over S7, in real time."""
+    from sagline.article.experiment import StopObserver, level_poses, with_cells
+    from sagline.article.experiment import experiment as driven
+    from sagline.article.ten_poses import HOME
+    from sagline.control.controller import Controller
+    from sagline.control.real_time import Pace
+    from sagline.plc.s7_link import S7Link
+    from sagline.twin.server import machine_in_process
+
+    with (
+        machine_in_process(with_cells(true), nominal, level_poses(HOME), seed=seed) as twin,
+        closing(S7Link(twin.addresses, nominal)) as link,
+    ):
+        watch = StopObserver(twin.position, tell)
+        return driven(Controller(nominal, link, pace=Pace(), record=watch), watch)
+
+
+def _how(true: str | None, waits: bool) -> str:
+    machine = "a twin of the prototype as planned" if true is None else f"a twin of {true}"
+    way = "in one process, not in real time" if waits else "over four S7 connections, in real time"
+    return f"The controller drove {machine}, {way}; its model was the prototype of Table 1, with assumed anchors."
+
+
+def _rows(result: Experiment) -> list[list[object]]:
+    """The heads of the columns, then one row per point: number, desired position and both distances."""
+    table = result.table
+    heads = ["point", *(f"desired {axis} [m]" for axis in "xyz"), "distance, article [m]", "distance [m]"]
+    rows = zip(table.points, table.desired.tolist(), table.distance.tolist(), result.distance.tolist(), strict=True)
+    return [[*heads], *([point, *place, theirs, ours] for point, place, theirs, ours in rows)]
+
+
+def _tell(result: Experiment) -> None:
+    table = result.table
+    places = [", ".join(number_text(x, ".2f") for x in place) for place in table.desired]
+    distances = zip(
+        (*table.distance, np.mean(table.distance)), (*result.distance, np.mean(result.distance)), strict=True
+    )
+    rows = [
+        [str(point), place, number_text(1e3 * theirs, ".1f"), number_text(1e3 * ours, ".3f")]
+        for point, place, (theirs, ours) in zip((*table.points, "mean"), (*places, ""), distances, strict=True)
+    ]
+    verdict = f"Mean distance of the points {n(1e3 * np.mean(result.distance), '.3f', 'mm')}"
+    verdict += f"; {n(1e3 * np.mean(table.distance), '.1f', 'mm')} in the article."
+    show_table(TextTable(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows), verdict)
+    took = n(result.duration / 60.0, ".1f", "min")
+    show_text(f"It took {took}; the fastest winch had {n(1e3 * result.winch_speed, '.0f', 'mm/s')}.")

@@ -4,43 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 from rich.text import Text
 
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.options import (
-    STYLE,
-    FigureStyle,
-    JsonOption,
-    ModelName,
-    ModelOption,
-    RobotArgument,
-    SeedOption,
-    TableOption,
-    argument,
-    flag,
-    only_with,
-    only_without,
-    option,
-    out_option,
-    quantity_option,
-)
-from sagline.cli.output import is_file
+from sagline.cli.output import is_file, values_of
 from sagline.cli.terminal import show_json, show_note, show_pieces, show_text, working
-from sagline.core.errors import FileError, InvalidValueError, printable
+from sagline.core.errors import printable
 from sagline.files.writing import check_files, create_folder, file_stem, write_text
-
-if TYPE_CHECKING:
-    from sagline.cables.model import CableModel
-    from sagline.calibration.log import WinchLog
-    from sagline.calibration.planning import CalibrationPoses
-    from sagline.calibration.result import Calibration
 
 ROBOTS: Final = (".yaml", ".yml")
 WHOLE: Final = ".nc"
 TABLE: Final = ".csv"
 FIGURES: Final = (".png", ".svg", ".pdf")
+VALIDATION: Final = ("folds", "position_m", "position_before_m", "tension_n", "tension_before_n")
 
 
 class _Request(NamedTuple):
@@ -51,7 +31,7 @@ class _Request(NamedTuple):
     deviations: dict[str, Any]
     files: tuple[Path, ...]
     plot: Path | None
-    style: FigureStyle
+    style: opt.FigureStyle
 
     def check_files(self, suffixes: tuple[str, ...]) -> None:
         """Reject files with other suffixes, the robot's own file, and files that cannot be written."""
@@ -59,32 +39,29 @@ class _Request(NamedTuple):
             assert file is not None
             if file.suffix.lower() not in allowed:
                 kinds = ", ".join(allowed)
-                raise FileError(file, f"the suffix is {file.suffix or 'missing'}; allowed: {kinds}", "Choose one.")
+                raise sl.FileError(file, f"the suffix is {file.suffix or 'missing'}; allowed: {kinds}", "Choose one.")
             if file.resolve() == Path(self.robot).resolve():
-                raise FileError(file, "is the input robot file; its comments would be lost", "Give another name.")
+                raise sl.FileError(file, "is the input robot file; its comments would be lost", "Give another name.")
             check_files(file.parent, [file.name])
 
 
 def _deviation_option(quantity: str, unit: str) -> Any:
-    return quantity_option("NUMBER", f"Standard deviation of {quantity}. Default: that of the log.", unit, above=0.0)
+    return opt.quantity("NUMBER", f"Standard deviation of {quantity}. Default: that of the log.", unit, above=0.0)
 
 
 def calibrate(
-    robot: RobotArgument,
+    robot: opt.RobotArgument,
     log: Annotated[
         Path | None,
-        argument(
+        opt.argument(
             "LOG", "CSV file, one row per pose: count_0, ... or length_0, ...; load_cell_0, ...; x, y, z if measured."
         ),
-        only_without("--plan"),
+        opt.only_without("--plan"),
     ] = None,
-    out: Annotated[
-        list[Path] | None,
-        out_option("none"),
-    ] = None,
+    out: Annotated[list[Path] | None, opt.out_option("none")] = None,
     unknowns: Annotated[
         str | None,
-        option(
+        opt.option(
             "NAMES",
             "Unknown parameters, with commas between. Default: "
             "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass, and with load cells "
@@ -96,18 +73,20 @@ def calibrate(
     position_deviation: Annotated[float | None, _deviation_option("a measured coordinate, '1 mm'", "m")] = None,
     rotation_deviation: Annotated[float | None, _deviation_option("a measured rotation, '1 mrad'", "rad")] = None,
     folds: Annotated[
-        int, option("NUMBER", "Groups of poses for the cross-validation; 0 for none."), only_without("--plan")
+        int, opt.option("NUMBER", "Groups of poses for the cross-validation; 0 for none."), opt.only_without("--plan")
     ] = 5,
-    robust: Annotated[bool, flag("Give outliers less weight.", "--robust/--no-robust"), only_without("--plan")] = True,
-    model: Annotated[ModelOption, only_without("--plan")] = ModelName.CATENARY,
+    robust: Annotated[
+        bool, opt.flag("Give outliers less weight.", "--robust/--no-robust"), opt.only_without("--plan")
+    ] = True,
+    model: Annotated[opt.ModelOption, opt.only_without("--plan")] = opt.ModelName.CATENARY,
     plot: Annotated[
-        Path | None, option("FILE", "Figure of the fit: .png, .svg or .pdf."), only_without("--plan")
+        Path | None, opt.option("FILE", "Figure of the fit: .png, .svg or .pdf."), opt.only_without("--plan")
     ] = None,
-    plan: Annotated[int | None, option("NUMBER", "Without LOG: choose this number of poses to measure.")] = None,
-    seed: Annotated[SeedOption, only_with("--plan")] = 0,
-    style: Annotated[FigureStyle, STYLE, only_with("--plot")] = FigureStyle.PLAIN,
-    write_table: Annotated[TableOption, only_without("--plan")] = False,
-    as_json: JsonOption = False,
+    plan: Annotated[int | None, opt.option("NUMBER", "Without LOG: choose this number of poses to measure.")] = None,
+    seed: Annotated[opt.SeedOption, opt.only_with("--plan")] = 0,
+    style: Annotated[opt.FigureStyle, opt.STYLE, opt.only_with("--plot")] = opt.FigureStyle.PLAIN,
+    write_table: Annotated[opt.TableOption, opt.only_without("--plan")] = False,
+    as_json: opt.JsonOption = False,
 ) -> int:
     """Estimate anchors, zeros and cables of a robot from its own readings.
 
@@ -148,26 +127,20 @@ def _files(robot: str, out: Iterable[Path], names: Iterable[str]) -> tuple[Path,
     return tuple(file for place in out for file in folders.get(place, [place]))
 
 
-def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
+def _fit(request: _Request, log: Path | None, model: sl.CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
     """Calibrate, write and print the result; returns the exit code."""
     from sagline.calibration import summary
-    from sagline.calibration.calibrate import calibrate
-    from sagline.calibration.findings import CalibrationStatus
-    from sagline.files.robot_file import load_robot
 
     if log is None:
         step = "Give the file of the readings, or choose poses with --plan 40."
-        raise InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
+        raise sl.InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
     if log.suffix.lower() in (*ROBOTS, WHOLE):
-        raise FileError(
-            log,
-            "is not a CSV file of readings",
-            "Give the file of the readings of encoders and load cells, such as winches.csv.",
-        )
+        step = "Give the file of the readings of encoders and load cells, such as winches.csv."
+        raise sl.FileError(log, "is not a CSV file of readings", step)
     request.check_files((*ROBOTS, WHOLE, TABLE))
-    robot, readings = load_robot(request.robot), _log(log, request.deviations)
+    robot, readings = sl.load_robot(request.robot), _log(log, request.deviations)
     with working(f"{robot.name}: calibrating from {len(readings):,} rows") as line:
-        found = calibrate(
+        found = sl.calibrate(
             robot, readings, request.unknowns, model=model, robust=robust, folds=folds, progress=line.progress
         )
         files = _written(found, request, line)
@@ -177,10 +150,10 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
         _show_lines(lambda width: summary.calibration_text(found, width))
         _tell_files(files)
         _tell_offset(found, files)
-    if found.status is CalibrationStatus.FOUND:
+    if found.status is sl.CalibrationStatus.FOUND:
         return 0
     show_note(f"{robot.name}: ", found.status.text, style="bold red")
-    if found.status is CalibrationStatus.NOT_CONVERGED and len(files) < len(request.files):
+    if found.status is sl.CalibrationStatus.NOT_CONVERGED and len(files) < len(request.files):
         show_note("", "No robot file is written, because the fit did not converge.")
     return OUTSIDE
 
@@ -188,15 +161,12 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
 def _plan_poses(request: _Request, count: int, seed: int, *, as_json: bool) -> int:
     """Choose poses, write and print them; returns the exit code."""
     from sagline.calibration import planning
-    from sagline.calibration.log import Sensors
-    from sagline.calibration.planning import calibration_poses
-    from sagline.files.robot_file import load_robot
 
     request.check_files(ROBOTS)
-    robot = load_robot(request.robot)
+    robot = sl.load_robot(request.robot)
     with working(f"{robot.name}: choosing {count:,} poses") as line:
-        sensors = Sensors(**request.deviations) if request.deviations else None
-        chosen = calibration_poses(robot, count, request.unknowns, sensors, seed=seed, progress=line.progress)
+        sensors = sl.Sensors(**request.deviations) if request.deviations else None
+        chosen = sl.calibration_poses(robot, count, request.unknowns, sensors, seed=seed, progress=line.progress)
         for file in request.files:
             create_folder(file.parent)
             chosen.save(file)
@@ -204,27 +174,25 @@ def _plan_poses(request: _Request, count: int, seed: int, *, as_json: bool) -> i
         show_json({**_record_of_poses(chosen), "files": list(request.files)})
         return 0
     _show_lines(lambda width: f"{planning.poses_text(chosen, width)}\n{planning.poses_table(chosen, width)}")
-    _tell_files(list(request.files))
+    _tell_files(request.files)
     return 0
 
 
-def _log(file: Path, deviations: dict[str, float]) -> WinchLog:
+def _log(file: Path, deviations: dict[str, float]) -> sl.WinchLog:
     """The log; deviations on the command line replace the deviations in the comments of the file."""
-    from sagline.files.log_file import load_log, sensors_of_comments
+    from sagline.files.log_file import sensors_of_comments
     from sagline.files.reading import read_text
     from sagline.files.table import TABLE_LIMIT
 
     if not deviations:
-        return load_log(file)
+        return sl.load_log(file)
     sensors, _ = sensors_of_comments(read_text(file, TABLE_LIMIT), file)
-    return load_log(file, sensors.replace(**deviations))
+    return sl.load_log(file, sensors.replace(**deviations))
 
 
-def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
+def _written(found: sl.Calibration, request: _Request, line: Any) -> list[Path]:
     """Write the result, the figure and, if the fit has converged, the robot; returns the files."""
-    from sagline.calibration.findings import CalibrationStatus
     from sagline.core.table import csv_text
-    from sagline.files.robot_file import dump_robot
 
     files = []
     for file in request.files:
@@ -233,19 +201,17 @@ def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
             found.save(file)
         elif file.suffix.lower() == TABLE:
             write_text(file, csv_text(_rows(found)))
-        elif found.status is not CalibrationStatus.NOT_CONVERGED:
-            write_text(file, dump_robot(found.robot))
+        elif found.status is not sl.CalibrationStatus.NOT_CONVERGED:
+            write_text(file, sl.dump_robot(found.robot))
         else:
             continue
         files.append(file)
     if request.plot is not None:
-        from sagline import plot
-
         line.stage("drawing")
         create_folder(request.plot.parent)
         with request.style.active():
-            figure = plot.calibration(found)
-        plot.save(figure, request.plot)
+            figure = sl.plot.calibration(found)
+        sl.plot.save(figure, request.plot)
         files.append(request.plot)
     return files
 
@@ -254,17 +220,15 @@ def _show_lines(text: Callable[[int], str]) -> None:
     """Print a text that depends on the width of the terminal."""
     from sagline.calibration import summary
 
-    show_pieces(
-        lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, summary.WIDTH)).splitlines()],
-    )
+    show_pieces(lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, summary.WIDTH)).splitlines()])
 
 
-def _tell_files(files: list[Path]) -> None:
+def _tell_files(files: Iterable[Path]) -> None:
     for file in files:
         show_text(f"In {file.resolve().parent}: {file.name}", whole=True)
 
 
-def _tell_offset(found: Calibration, files: list[Path]) -> None:
+def _tell_offset(found: sl.Calibration, files: list[Path]) -> None:
     """Print the zero offsets of measured lengths as a note, because a robot file does not contain them."""
     robots = [file.name for file in files if file.suffix.lower() in ROBOTS]
     if robots and found.length_offset.any():
@@ -274,67 +238,44 @@ def _tell_offset(found: Calibration, files: list[Path]) -> None:
         show_note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
 
 
-def _rows(found: Calibration) -> Iterator[Sequence[object]]:
+def _rows(found: sl.Calibration) -> Iterator[Sequence[object]]:
     """The heads of the columns, then one row per parameter: value, standard error and prior value."""
     numbers = found.parameters
     yield "name", "value", "standard error", "before", "unit"
     yield from zip(numbers.labels, found.values, found.standard_error, numbers.prior, numbers.units, strict=True)
 
 
-def _record(found: Calibration) -> dict[str, Any]:
+def _record(found: sl.Calibration) -> dict[str, Any]:
     check = found.cross_validation
     return {
         "robot": found.robot.name,
         "status": found.status.name,
-        "log": found.log,
-        "date": found.date,
-        "chi_squared": found.chi_squared,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "chi_squared_of_all": found.chi_squared_of_all,
-        "iterations": found.iterations,
+        **values_of(found, "log", "date", "chi_squared", "degrees_of_freedom", "chi_squared_of_all", "iterations"),
         "numbers": [
             dict(zip(("name", "value", "standard_error", "before", "unit"), row, strict=True))
             for row in list(_rows(found))[1:]
         ],
         "rows": len(found.rows),
         "left_out": {reason.name: rows for reason, rows in found.left_out.items()},
-        "outliers": [
-            {"row": one.row, "cable": one.cable, "quantity": one.quantity, "size": one.size} for one in found.outliers
-        ],
-        "gauge": [{"name": one.name, "step": one.step} for one in found.gauge],
-        "cannot_tell_apart": [
-            {"name": one.name, "known": one.known, "step": one.step} for one in found.cannot_tell_apart
-        ],
-        "criticisms": [
-            {"name": one.name, "fall": one.fall, "chance": one.chance, "moves": one.moves, "change": one.change}
-            for one in found.criticisms
-        ],
-        "cross_validation": None
-        if check is None
-        else {
-            "folds": check.folds,
-            "position_m": check.position,
-            "position_before_m": check.position_before,
-            "tension_n": check.tension,
-            "tension_before_n": check.tension_before,
-        },
+        "outliers": [values_of(one, "row", "cable", "quantity", "size") for one in found.outliers],
+        "gauge": [values_of(one, "name", "step") for one in found.gauge],
+        "cannot_tell_apart": [values_of(one, "name", "known", "step") for one in found.cannot_tell_apart],
+        "criticisms": [values_of(one, "name", "fall", "chance", "moves", "change") for one in found.criticisms],
+        "cross_validation": None if check is None else values_of(check, *VALIDATION),
     }
 
 
-def _record_of_poses(chosen: CalibrationPoses) -> dict[str, Any]:
+def _record_of_poses(chosen: sl.CalibrationPoses) -> dict[str, Any]:
     numbers = chosen.parameters
     return {
         "robot": chosen.robot.name,
-        "position_m": chosen.poses.position,
-        "quaternion": chosen.poses.quaternion,
-        "frame_end_tension_n": chosen.frame_end_tension,
-        "unstrained_length_m": chosen.unstrained_length,
+        **values_of(chosen.poses, "position_m", "quaternion"),
+        **values_of(chosen, "frame_end_tension_n", "unstrained_length_m"),
         "numbers": [
             {"name": label, "expected_error": error, "random_error": random, "unit": unit}
             for label, error, random, unit in zip(
                 numbers.labels, chosen.expected_error, chosen.random_error, numbers.units, strict=True
             )
         ],
-        "enough": chosen.enough,
-        "most_helpful": chosen.most_helpful,
+        **values_of(chosen, "enough", "most_helpful"),
     }

@@ -1,29 +1,37 @@
-"""`sagline control`: the controller, which carries out the commands that an operator types."""
+"""`sagline control` and `sagline twin`: the controller, and a simulated machine with one server per PLC."""
 
 from __future__ import annotations
 
 import gc
+import re
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from typing import TYPE_CHECKING, Annotated
+from socket import gethostname
+from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.options import LogOption, ModbusOption, PriorityOption, RobotArgument, flag, option
+import sagline as sl
+from sagline.cli import options as opt
+from sagline.cli.terminal import show_note, show_text
 
 if TYPE_CHECKING:
     from sagline.control.link import Link
-    from sagline.robot.robot import Robot
+    from sagline.files.mcap_writer import Recorder
+    from sagline.twin.link import Report
+    from sagline.twin.machine import Machine
+    from sagline.twin.server import Server
 
 
 def control(
-    name: RobotArgument,
+    name: opt.RobotArgument,
     plc: Annotated[
         str,
-        option("ADDRESS,...", "Address of the PLC of each group: host, host:port or [IPv6]:port.", "--plc"),
+        opt.option("ADDRESS,...", "Address of the PLC of each group: host, host:port or [IPv6]:port.", "--plc"),
     ],
-    modbus: ModbusOption = False,
-    shadow: Annotated[bool, flag("Only read and log; send no commands.", "--shadow")] = False,
-    log: LogOption = None,
-    priority: PriorityOption = None,
+    modbus: opt.ModbusOption = False,
+    shadow: Annotated[bool, opt.flag("Only read and log; send no commands.", "--shadow")] = False,
+    log: opt.LogOption = None,
+    priority: opt.PriorityOption = None,
 ) -> int:
     """Control a machine: connect, home, follow paths, until quit.
 
@@ -41,9 +49,8 @@ def control(
     from sagline.cli.session import OperatorSession
     from sagline.control.controller import Controller
     from sagline.control.real_time import Pace, set_priority
-    from sagline.files.robot_file import load_robot
 
-    robot = load_robot(name)
+    robot = sl.load_robot(name)
     if priority is not None:
         set_priority(priority)  # before the threads of link and log start, because they inherit the priority
     with ExitStack() as stack:
@@ -60,7 +67,141 @@ def control(
         return session.run()
 
 
-def _link(robot: Robot, plc: str, *, modbus: bool) -> Link:
+def _link(robot: sl.Robot, plc: str, *, modbus: bool) -> Link:
     from sagline.plc import ModbusLink, S7Link
 
     return ModbusLink(plc, robot) if modbus else S7Link(plc, robot)
+
+
+LOOK: Final = 0.1  # time between two checks of the PLCs [s]
+LATE: Final = 0.05  # delay of a scan above which a message is printed [s]
+STATUS: Final = {  # the first text whose bit of `GroupStatus` is set is printed
+    "EMERGENCY": "emergency stop",
+    "LOCKED": "drums locked",
+    "BRAKED": "brakes on",
+    "RAMPING": "slowing down",
+    "HOLDING": "holding by itself",
+    "FOLLOWING": "following",
+    "READY": "holding",
+}
+
+
+def twin(
+    name: opt.RobotArgument,
+    true: opt.TrueOption = None,
+    port: opt.PortOption = 11021,
+    host: opt.HostOption = "127.0.0.1",
+    modbus: opt.ModbusOption = False,
+    seed: opt.SeedOption = 0,
+    faults: Annotated[
+        list[str] | None,
+        opt.option(
+            "TEXT",
+            "A fault and its time: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; parts count from 0. "
+            "The option can be repeated.",
+            "--fault",
+        ),
+    ] = None,
+    log: opt.LogOption = None,
+    priority: opt.PriorityOption = None,
+) -> int:
+    """Simulate plant, drives and PLCs of a robot in real time, until Ctrl-C.
+
+    Each group of two winches has a simulated PLC: a server with the data blocks of a real PLC. The servers use
+    consecutive ports from --port on. The PLCs have the values of ROBOT. The log has the true pose of the platform. The
+    first lines show the command that connects a controller; later lines show changes of the PLCs. Exit code 130.
+
+    For example:
+
+        sagline twin article-prototype
+        sagline twin article-prototype --fault "cell 3 sticks at 40 s"
+        sagline twin article-prototype --true worn.yaml --log twin.mcap
+        sagline twin article-prototype --modbus --port 5020
+    """
+    from sagline.control.real_time import set_priority
+    from sagline.twin.machine import Machine
+    from sagline.twin.server import SCAN, Server, check_first_port
+
+    robot = sl.load_robot(name)
+    check_first_port(port, robot)
+    real = robot if true is None else sl.load_robot(true)
+    if priority is not None:
+        set_priority(priority)
+    with ExitStack() as stack:
+        machine = Machine(real, nominal=robot, seed=seed, period=SCAN, faults=tuple(faults or ()))
+        server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
+        watch = TwinMonitor(machine)
+        if log is not None:
+            from sagline.files.mcap_writer import Recorder
+
+            watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
+        _greet(name, server, modbus=modbus)
+        gc.collect()
+        gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
+        try:
+            server.run(watch)
+        finally:
+            if server.late > LATE:
+                show_note("Note: ", f"This computer was busy: the twin was up to {server.late:.2f} s late.")
+    return 0
+
+
+def _greet(name: str, server: Server, *, modbus: bool) -> None:
+    machine = server.machine
+    winches, groups = machine.robot.cable_count, len(machine.groups)
+    protocol = "Modbus TCP" if modbus else "S7"
+    show_text(f"{machine.nominal.name}: {winches} winches on {groups} PLCs with {protocol}, brakes on.")
+    show_text("From another terminal:")
+    show_text(f"  sagline control {name}{' --modbus' * modbus} \\", whole=True)
+    places = [re.sub(r"^(0\.0\.0\.0|\[::\])(?=:)", gethostname(), place) for place in server.addresses]
+    show_text(f"    --plc {','.join(places)}", whole=True)
+    show_text("Ctrl-C stops it.")
+    if not server.addresses[0].startswith(("127.", "[::1]")):
+        show_note("Note: ", "everyone who can reach this machine can drive it; there is no password.", style="bold")
+
+
+class TwinMonitor:
+    """Observer that prints changes of the PLCs and records the motion of the platform."""
+
+    def __init__(self, machine: Machine) -> None:
+        """Prepare to watch a machine, beginning with its present state."""
+        self.recorder: Recorder | None = None
+        self._stopped = ""
+        self._machine = machine
+        self._known = self._look()
+        self._next = 0.0
+
+    def __call__(self, time: float, reading: sl.Reading) -> None:
+        """Record the true state after the scan at `time` [s], and print all changes of the PLCs."""
+        if self.recorder is not None:
+            self.recorder.truth(time, reading.position.copy(), reading.quaternion.copy())
+        if time >= self._next:
+            self._next = time + LOOK
+            self._tell(time)
+
+    def _look(self) -> list[str]:
+        reports = [self._machine.report(group) for group in range(len(self._machine.groups))]
+        return ["sends no new data" if report is None else _doing(report) for report in reports]
+
+    def _tell(self, time: float) -> None:
+        now = self._look()
+        changed = [i for i, (new, old) in enumerate(zip(now, self._known, strict=True)) if new != old]
+        for what in dict.fromkeys(now[i] for i in changed):
+            show_text(f"{time:9.1f} s  {_groups([i for i in changed if now[i] == what])} {what}")
+        self._known = now
+        if self.recorder is not None and self.recorder.stopped != self._stopped:
+            self._stopped = self.recorder.stopped
+            show_note("Note: ", f"the log has stopped: {self._stopped}", style="bold")
+
+
+def _doing(report: Report) -> str:
+    """Text of the state of a PLC."""
+    from sagline.control.link import GroupStatus, fault_text
+
+    state = next((words for name, words in STATUS.items() if report.status & GroupStatus[name]), "not ready")
+    why = f" ({fault_text(report.fault)})" if report.fault else ""
+    return f"{state}{why}, {f'driven by {report.owner}' if report.owner else 'free'}"
+
+
+def _groups(groups: Sequence[int]) -> str:
+    return f"group{'s' * (len(groups) > 1)} {', '.join(str(group) for group in groups)}:"

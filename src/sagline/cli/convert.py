@@ -1,31 +1,20 @@
-"""`sagline convert`: conversion of robots of other tools to robot files, and of any robot to a MuJoCo model."""
+"""`sagline convert`, `export-c` and `export-scl`: files for other tools, microcontrollers and PLCs."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
-from sagline.cli.options import (
-    FileOption,
-    argument,
-    only_with,
-    option,
-    quantity_option,
-)
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.output import file_of
-from sagline.cli.terminal import show_data, show_note
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.cli.terminal import show_data, show_note, show_text
 from sagline.core.numbers import n
 from sagline.files.writing import create_folder, write_text
-
-if TYPE_CHECKING:
-    from sagline.cables.cable import Cable
-    from sagline.files.robot_xml import Imported
-    from sagline.robot.robot import Robot
 
 
 class _Format(StrEnum):
@@ -42,28 +31,30 @@ ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf")}
 def convert(
     source: Annotated[
         str,
-        argument(
+        opt.argument(
             "SOURCE", "A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset."
         ),
     ],
-    out: FileOption = None,
+    out: opt.FileOption = None,
     form: Annotated[
-        _Format, option("KIND", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--kind")
+        _Format, opt.option("KIND", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--kind")
     ] = _Format.ROBOT,
     linear_density: Annotated[
         float | None,
-        quantity_option("QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m"),
-        only_with("--axial-stiffness"),
+        opt.quantity("QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m"),
+        opt.only_with("--axial-stiffness"),
     ] = None,
     axial_stiffness: Annotated[
         float | None,
-        quantity_option("QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N"),
-        only_with("--linear-density"),
+        opt.quantity("QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N"),
+        opt.only_with("--linear-density"),
     ] = None,
-    cable_set: Annotated[str | None, option("NAME", "CASPR: name of the cable set. Default: that of the file.")] = None,
+    cable_set: Annotated[
+        str | None, opt.option("NAME", "CASPR: name of the cable set. Default: that of the file.")
+    ] = None,
     at: Annotated[
         tuple[str, str, str] | None,
-        option("X Y Z", "MuJoCo: initial position of the platform [m]. Default: middle of the test box."),
+        opt.option("X Y Z", "MuJoCo: initial position of the platform [m]. Default: middle of the test box."),
     ] = None,
 ) -> None:
     r"""Convert a robot of CASPR or WireX to a robot file, or convert any robot to a MuJoCo model.
@@ -79,24 +70,23 @@ def convert(
     """
     from sagline.core.arrays import FARTHEST
     from sagline.files.pose_text import decimal_numbers
-    from sagline.files.robot_file import dump_robot
 
     out = out if out is None else file_of(out, f"{Path(source).stem}{ENDINGS[form][0]}")
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
-        raise FileError(out, "is the file to convert", "Name another file with --out.")
+        raise sl.FileError(out, "is the file to convert", "Name another file with --out.")
     if out is not None and out.suffix.lower() not in ENDINGS[form]:
         kind = "a robot file" if form is _Format.ROBOT else "a MuJoCo model"
-        raise FileError(
+        raise sl.FileError(
             out, f"is not a valid name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --kind."
         )
     if at is not None and form is _Format.ROBOT:
-        raise InvalidValueError(
+        raise sl.InvalidValueError(
             "--at", "given for a robot file", "--kind mjcf", "A robot file contains no pose. Leave the option out."
         )
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
     if form is _Format.ROBOT:
-        text = dump_robot(imported.robot)
+        text = sl.dump_robot(imported.robot)
     else:
         text, straightness = _mjcf(imported.robot, place)
         imported = replace(imported, lost=(*imported.lost, straightness))
@@ -108,46 +98,31 @@ def convert(
     _report(imported, out)
 
 
-def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
-    from sagline.files.robot_file import load_robot
-    from sagline.files.robot_xml import Imported
-
+def _read(source: str, cables: sl.Cable | None, cable_set: str | None) -> sl.Imported:
     path = Path(source)
     is_caspr = path.suffix.lower() == ".xml" or path.is_dir()
     if cable_set is not None and not is_caspr:
-        raise InvalidValueError("--cable-set", repr(cable_set), "none except for CASPR", "Leave it out.")
+        raise sl.InvalidValueError("--cable-set", repr(cable_set), "none except for CASPR", "Leave it out.")
     if path.suffix.lower() == ".wcrfx":
-        from sagline.files.wirex import load_wirex
-
-        return load_wirex(path, cables)
+        return sl.load_wirex(path, cables)
     if is_caspr:
-        from sagline.files.caspr import load_caspr
-
-        return load_caspr(path, cables, cable_set)
-    robot = load_robot(source)
-    return Imported(robot if cables is None else robot.replace(cables=cables), ())
+        return sl.load_caspr(path, cables, cable_set)
+    robot = sl.load_robot(source)
+    return sl.Imported(robot if cables is None else robot.replace(cables=cables), ())
 
 
-def _material(density: float | None, stiffness: float | None) -> Cable | None:
-    from sagline.cables.cable import Cable
-
-    return None if density is None or stiffness is None else Cable(density, stiffness)
+def _material(density: float | None, stiffness: float | None) -> sl.Cable | None:
+    return None if density is None or stiffness is None else sl.Cable(density, stiffness)
 
 
-def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
+def _mjcf(robot: sl.Robot, at: list[float] | None) -> tuple[str, str]:
     """The MuJoCo model of `robot`, and its position error, which results from tendons without sag and weight."""
-    from sagline.cables.models import Elastic
-    from sagline.files.mjcf import dump_mjcf
-    from sagline.kinematics.confirm import confirm
-    from sagline.kinematics.inverse import inverse
-    from sagline.robot.pose import Pose
-
     if at is None and robot.test_box is None:
-        raise InvalidValueError("--at", "missing", "X Y Z in m", "Give the initial position of the platform.")
+        raise sl.InvalidValueError("--at", "missing", "X Y Z in m", "Give the initial position of the platform.")
     position = at if at is not None else 0.5 * (robot.test_box.low + robot.test_box.high)  # type: ignore[union-attr]
-    pose = Pose.from_euler(position, 0.0, 0.0, 0.0)
-    text = dump_mjcf(robot, pose)
-    proof = confirm(inverse(robot, pose, model=Elastic()))
+    pose = sl.Pose.from_euler(position, 0.0, 0.0, 0.0)
+    text = sl.dump_mjcf(robot, pose)
+    proof = sl.confirm(sl.inverse(robot, pose, model=sl.Elastic()))
     away = float(np.linalg.norm(proof.position_error))
     held = (
         f"hold the platform {n(1e3 * max(away, LEAST), '.2g', 'mm')} away"
@@ -157,10 +132,72 @@ def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
     return text, f"Sag and weight of the cables: sagging cables of these lengths {held}."
 
 
-def _report(imported: Imported, out: Path | None) -> None:
+def _report(imported: sl.Imported, out: Path | None) -> None:
     robot = imported.robot
     show_note(f"{robot.name}: ", f"{robot.cable_count} cables, {robot.motion_pattern}" + (f", in {out}" if out else ""))
     for field, why in robot.assumed.items():
         show_note("Assumed: ", f"{field}: {why}")
     for what in imported.lost:
         show_note("Lost: ", what)
+
+
+def export_c(
+    robot: opt.RobotArgument,
+    out: opt.OutOption = Path("sagline.c"),
+    tension: Annotated[
+        list[opt.Tension] | None,
+        opt.choice("METHOD", "Tension distribution method", opt.Tension),
+    ] = None,
+    variable: opt.VariableOption = opt.TensionVariable.CHORD,
+    forward: Annotated[bool, opt.flag("Write the forward kinematics too.", "--forward")] = False,
+    single_precision: Annotated[
+        bool, opt.flag("Single precision, for controllers without double precision in hardware.", "--float")
+    ] = False,
+) -> None:
+    """Write C99 source of a robot's kinematics for a microcontroller, and SCL source of a cable's length for a PLC.
+
+    The source has the kernels of sagline, including pulleys. They compute the tensions and lengths of a pose and, with
+    --forward, the pose of given lengths. The source needs no heap, and every call returns a status. The header and the
+    SCL file are written next to the source. --tension can be repeated.
+
+    For example:
+
+        sagline export-c article-prototype --out sagline.c
+        sagline export-c own_robot.yaml --out robot.c --float --forward
+        sagline export-c cogiro --tension minimum-norm --tension centroid
+    """
+    loaded = sl.load_robot(robot)
+    methods = [each.build(variable) for each in tension or [opt.Tension.CLOSEST]]
+    target = file_of(out, "sagline.c")
+    create_folder(target.parent)
+    source, header, scl = sl.export_c(
+        loaded, target, tension=methods, forward=forward, single_precision=single_precision
+    )
+    precision = "single" if single_precision else "double"
+    show_note(f"{loaded.name}: ", f"{loaded.cable_count} cables, {loaded.motion_pattern}, {precision} precision")
+    show_text(f"{source}: C99; cc -std=c99 -O2 -ffp-contract=off -c {source.name}", whole=True)
+    show_text(f"{header}: the declarations", whole=True)
+    show_text(f"{scl}: P3 in SCL for a Siemens PLC, not compiled yet", whole=True)
+
+
+def export_scl(
+    robot: opt.RobotArgument,
+    out: opt.OutOption = Path("plc.scl"),
+) -> None:
+    """Write SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits, and the program of one group.
+
+    The program accepts commands of one controller at a time. It enforces the limits, and slows the winches down when
+    commands are missing. It has not been compiled yet; the comment at its head lists the settings of the CPU.
+
+    For example:
+
+        sagline export-scl article-prototype --out plc.scl
+    """
+    from sagline.control.link import groups_of
+
+    loaded = sl.load_robot(robot)
+    target = file_of(out, "plc.scl")
+    create_folder(target.parent)
+    path = sl.export_scl(loaded, target)
+    groups = len(groups_of(loaded.cable_count))
+    show_text(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)

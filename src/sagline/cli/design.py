@@ -3,42 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
-from sagline.cli.options import (
-    USUAL_FORMATS,
-    FiguresOption,
-    FigureStyle,
-    FormatsOption,
-    JsonOption,
-    OutOption,
-    RobotArgument,
-    StyleOption,
-    argument,
-    option,
-)
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_note, working
 from sagline.files.writing import create_folder
-
-if TYPE_CHECKING:
-    from sagline.optimization.front import Front
 
 FIGURE: Final = "front"
 MOST_ROWS: Final = 12  # largest number of printed robots; front.csv lists all of them
 
 
 def design(
-    robot: RobotArgument,
-    file: Annotated[Path, argument("DESIGN", "File with design variables, their bounds and goals, design.yaml.")],
-    out: OutOption = Path("front"),
+    robot: opt.RobotArgument,
+    file: Annotated[Path, opt.argument("DESIGN", "File with design variables, their bounds and goals, design.yaml.")],
+    out: opt.OutOption = Path("front"),
     evaluations: Annotated[
-        str | None, option("NUMBER", "Number of robots to evaluate. Default: the number in the file.")
+        str | None, opt.option("NUMBER", "Number of robots to evaluate. Default: the number in the file.")
     ] = None,
-    figures: FiguresOption = True,
-    formats: FormatsOption = USUAL_FORMATS,
-    style: StyleOption = FigureStyle.PLAIN,
-    as_json: JsonOption = False,
+    figures: opt.FiguresOption = True,
+    formats: opt.FormatsOption = opt.USUAL_FORMATS,
+    style: opt.StyleOption = opt.FigureStyle.PLAIN,
+    as_json: opt.JsonOption = False,
 ) -> None:
     r"""Search for a better robot; a file states the design variables (anchors, cables, limits) and the goals.
 
@@ -51,16 +38,12 @@ def design(
         sagline design own_robot.yaml design.yaml --out front \
             --evaluations 600
     """
-    from sagline.cli.values import whole_of
-    from sagline.files.robot_file import load_robot
-    from sagline.optimization.design import design as search
-    from sagline.optimization.file import load_design
     from sagline.optimization.front import FRONT
     from sagline.optimization.request import MOST_EVALUATIONS
 
-    first, request = load_robot(robot), load_design(file)
+    first, request = sl.load_robot(robot), sl.load_design(file)
     if evaluations is not None:
-        request["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
+        request["evaluations"] = opt.whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
     output = Output(out, "", [FRONT], [FIGURE] * figures, formats, style)
     rated = [0]
     with working(f"{first.name}: evaluating robots") as line:
@@ -71,52 +54,51 @@ def design(
 
         try:
             create_folder(out.absolute().parent)
-            front = search(first, **request, folder=out, progress=show_progress)
+            front = sl.design(first, **request, folder=out, progress=show_progress)
         except KeyboardInterrupt:
             show_note("", f"{rated[0]:,} evaluated robots are in {out}: the same command continues.")
             raise
         output.files = front.save(out)
         if figures:
-            from sagline import plot
-
             line.stage("drawing")
-            output.draw(lambda: plot.front(front))
+            output.draw(lambda: sl.plot.front(front))
     output.report(lambda: _record(front), front.text, lambda: show_table(_table(front)), as_json=as_json)
 
 
-def _table(front: Front) -> TextTable:
+def _table(front: sl.Front) -> TextTable:
     """The first robot and the best robots: goals, then the design variables."""
     heads = ["", *(f"{goal.kind}\n[{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
     heads += [f"{part.name}\n[{part.unit}]" if part.unit else part.name for part in front.parts]
     rows = [[front.start.name, *_cells(front.start_values), *_cells([part.start for part in front.parts])]]
-    if front.better:
-        found = zip(front.robots, front.values, front.changed, strict=True)
-        rows += [[robot.name, *_cells(values), *_cells(changed)] for robot, values, changed in found]
+    rows += [[name, *_cells(values), *_cells(changed)] for name, values, changed in _better(front)]
     return TextTable(heads, rows[:MOST_ROWS])
+
+
+def _better(front: sl.Front) -> list[tuple[str, Any, Any]]:
+    """Name, goals and design variables of each robot that is better than the first one."""
+    names = [robot.name for robot in front.robots]
+    return list(zip(names, front.values, front.changed, strict=True)) if front.better else []
 
 
 def _cells(values: Any) -> list[str]:
     return [number_text(float(value), ".4g") for value in values]
 
 
-def _record(front: Front) -> dict[str, object]:
-    robots = zip(front.robots, front.values, front.changed, strict=True) if front.better else ()
+def _record(front: sl.Front) -> dict[str, object]:
     goals, parts = [goal.kind for goal in front.goals], [part.name for part in front.parts]
+    units = {goal.kind: goal.unit for goal in front.goals} | {part.name: part.unit for part in front.parts}
     return {
         "robot": front.start.name,
         "better": front.better,
         "evaluations": len(front.evaluated),
         "goals": dict(zip(goals, front.start_values, strict=True)),
-        "units": {
-            **{goal.kind: goal.unit for goal in front.goals},
-            **{part.name: part.unit for part in front.parts},
-        },
+        "units": units,
         "robots": [
             {
-                "robot": robot.name,
+                "robot": name,
                 "goals": dict(zip(goals, values, strict=True)),
                 "changed": dict(zip(parts, changed, strict=True)),
             }
-            for robot, values, changed in robots
+            for name, values, changed in _better(front)
         ],
     }

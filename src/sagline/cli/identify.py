@@ -8,23 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 
-from sagline.cli.options import (
-    JsonOption,
-    OutOption,
-    TableOption,
-    argument,
-    choice_option,
-    flag,
-    only_with,
-    quantity_option,
-)
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.numbers import n
 
 if TYPE_CHECKING:
-    from sagline.article.identify import EmpiricalFit
-    from sagline.article.identify_cable import CableFit
     from sagline.files.table import Measurements
 
 
@@ -42,22 +32,23 @@ TOLERANCE = 5e-3  # position error that the printed range keeps [m]; the article
 
 
 def identify(
-    file: Annotated[Path, argument("CSV", "Columns span, rise, length, tension. Units in the heads: span [mm].")],
+    file: Annotated[Path, opt.argument("CSV", "Columns span, rise, length, tension. Units in the heads: span [mm].")],
     length_error: Annotated[
-        float, quantity_option("LENGTH", "Standard error of a measured length, 0.002 or '2 mm'.", "m", above=0.0)
+        float, opt.quantity("LENGTH", "Standard error of a measured length, 0.002 or '2 mm'.", "m", above=0.0)
     ] = 0.001,
     tension_error: Annotated[
-        float, quantity_option("FORCE", "Standard error of a measured tension, 5 or '5 N'.", "N", above=0.0)
+        float, opt.quantity("FORCE", "Standard error of a measured tension, 5 or '5 N'.", "N", above=0.0)
     ] = 1,
     tension_at: Annotated[
-        _TensionPlace, choice_option("PLACE", "Place of the tension measurement", _TensionPlace)
+        _TensionPlace, opt.choice("PLACE", "Place of the tension measurement", _TensionPlace)
     ] = _TensionPlace.FRAME_END,
     offset: Annotated[
-        bool, flag("Estimate the zero offset of the measured lengths as a further parameter.", "--offset/--no-offset")
+        bool,
+        opt.flag("Estimate the zero offset of the measured lengths as a further parameter.", "--offset/--no-offset"),
     ] = False,
-    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
-    write_table: TableOption = False,
-    as_json: JsonOption = False,
+    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
+    write_table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
 ) -> None:
     """Estimate the linear density, the axial stiffness and the empirical model of a measured cable.
 
@@ -68,13 +59,12 @@ def identify(
         sagline identify cable.csv
         sagline identify cable.csv --length-error "2 mm" --tension-at platform-end --offset
     """
-    from sagline.article.identify_cable import UNITS, identify_cable
-    from sagline.files.table import load_measurements
+    from sagline.article.identify_cable import UNITS
 
     output = Output(folder, file.stem, [TABLE] * write_table)
-    data = load_measurements(file)
+    data = sl.load_measurements(file)
     with working(f"{file.name}: identifying"):
-        cable = identify_cable(
+        cable = sl.identify_cable(
             *data,
             length_error=length_error,
             tension_error=tension_error,
@@ -108,18 +98,16 @@ def identify(
         show_note("Warning: ", warning, style="bold yellow")
 
 
-def _model(cable: CableFit, data: Measurements) -> EmpiricalFit:
+def _model(cable: sl.CableFit, data: Measurements) -> sl.EmpiricalFit:
     """The empirical model over the measured range of spans, rises and tensions."""
-    from sagline.article.identify import identify_empirical
-
     horizontal = data.tension * data.span / np.hypot(data.span, data.rise)
     spans, rises, tensions = (
         np.linspace(values.min(), values.max(), STEPS) for values in (data.span, data.rise, horizontal)
     )
-    return identify_empirical(cable.cable, spans, rises, tensions)
+    return sl.identify_empirical(cable.cable, spans, rises, tensions)
 
 
-def _record(cable: CableFit, model: EmpiricalFit) -> dict[str, Any]:
+def _record(cable: sl.CableFit, model: sl.EmpiricalFit) -> dict[str, Any]:
     return {
         "values": dict(zip(cable.names, cable.values, strict=True)),
         "standard_errors": dict(zip(cable.names, cable.standard_error, strict=True)),

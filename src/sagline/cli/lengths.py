@@ -1,4 +1,4 @@
-"""`sagline lengths` and `sagline encoder`: lengths and encoder counts of a run."""
+"""`sagline lengths`, `encoder` and `forward`: lengths and counts of a run, and poses from lengths or counts."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.options import FileOption, argument, option
-from sagline.cli.output import file_of
-from sagline.cli.terminal import show_data, show_note, working
-from sagline.core.errors import FileError
-from sagline.files.writing import create_folder, write_text
+from sagline.cli.output import Output, TextTable, file_of, number_text, show_table
+from sagline.cli.terminal import show_data, show_json, show_note, show_text, working
+from sagline.files.writing import create_folder, file_stem, write_text
 
 if TYPE_CHECKING:
-    from sagline.kinematics.plan import Plan
+    from sagline.core.arrays import Array
 
 
 class _Winding(StrEnum):
@@ -27,12 +27,12 @@ class _Winding(StrEnum):
     REMEMBERED = "remembered"
 
 
-RunArgument = Annotated[Path, argument("RUN.nc", "A run written by sagline track.")]
+RunArgument = Annotated[Path, opt.argument("RUN.nc", "A run written by sagline track.")]
 
 
 def lengths(
     file: RunArgument,
-    out: FileOption = None,
+    out: opt.FileOption = None,
 ) -> int:
     """Write the planned lengths of a run as CSV, one row per sample; `sagline forward` and controllers read the file.
 
@@ -51,13 +51,13 @@ def encoder(
     file: RunArgument,
     winding: Annotated[
         _Winding,
-        option(
+        opt.option(
             "WINDING",
             "Tension of the cable on the drums. constant: winding_tension of the winches; remembered: the "
             "tension at the time when the path wound the cable.",
         ),
     ] = _Winding.CONSTANT,
-    out: FileOption = None,
+    out: opt.FileOption = None,
 ) -> int:
     """Write the encoder counts of a run as CSV, one row per sample, for the drives.
 
@@ -69,18 +69,16 @@ def encoder(
 
         sagline encoder output/my-robot-catenary.nc --out counts.csv
     """
-    from sagline.kinematics.winches import encoder_counts, winch_rates
-
     out = out if out is None else file_of(out, f"{file.stem}-counts.csv")
     plan = _plan_of(file, out)
-    counts = np.atleast_2d(encoder_counts(plan, winding.value))
+    counts = np.atleast_2d(sl.encoder_counts(plan, winding.value))
     whole = [[int(count) if count == count else count for count in row] for row in counts.tolist()]
     code = write_rows(plan, "C{}", whole, out)
     winches = plan.state.one_robot.winches
     if plan.path is None or winches is None or (winches.speed_limit is None and winches.torque_limit is None):
         return code
     with working(f"{file.name}: speeds and torques of the winches"):
-        rates = winch_rates(plan)
+        rates = sl.winch_rates(plan)
     for beyond, limit in ((rates.too_fast, "speed_limit"), (rates.too_strong, "torque_limit")):
         if beyond is not None and beyond.any():
             samples = beyond.any(axis=1)
@@ -90,7 +88,7 @@ def encoder(
     return OUTSIDE if rates.exceeding.any() else code
 
 
-def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
+def write_rows(plan: sl.Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
     """Write `rows` of solved samples, each with its time; returns the exit code. `name` formats a column's head."""
     from sagline.core.table import csv_text
 
@@ -117,13 +115,102 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
     return OUTSIDE
 
 
-def _plan_of(file: Path, out: Path | None) -> Plan:
+def _plan_of(file: Path, out: Path | None) -> sl.Plan:
     """The plan in the file of a run. FileError if no sample is feasible, or if the output would replace this file."""
-    from sagline.files.plan_file import load_plan
-
     if out is not None and out.exists() and out.resolve() == file.resolve():
-        raise FileError(out, "is the run itself", "Name another file with --out.")
-    plan = load_plan(file)
+        raise sl.FileError(out, "is the run itself", "Name another file with --out.")
+    plan = sl.load_plan(file)
     if not plan.solved.any():
-        raise FileError(file, "has no solved sample", "Plan another path, or raise the limits.")
+        raise sl.FileError(file, "has no solved sample", "Plan another path, or raise the limits.")
     return plan
+
+
+SHOWN = 12  # largest number of printed rows; the file has all rows
+COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
+Cell = float | str
+
+
+def forward(
+    name: opt.RobotArgument,
+    file: Annotated[
+        Path,
+        opt.argument("CSV", "Columns length_0, length_1, ... and optionally time. Units in the heads: length_0 [mm]."),
+    ],
+    counts: Annotated[
+        bool, opt.flag("The columns are count_0, count_1, ..., the encoder counts of the robot's winches.", "--counts")
+    ] = False,
+    model: opt.ModelOption = opt.ModelName.CATENARY,
+    wrench: opt.WrenchOption = None,
+    payload: opt.PayloadOption = None,
+    folder: opt.OutOption = Path("output"),
+    write_table: opt.TableOption = True,
+    as_json: opt.JsonOption = False,
+) -> int:
+    """Find the poses of the platform from measured cable lengths.
+
+    The first sample needs no initial pose. The pose of each sample is the initial pose of the next sample. Exit code 1
+    if a sample has no stable equilibrium.
+
+    For example:
+
+        sagline forward cogiro lengths.csv --out poses
+        sagline forward my_robot.yaml counts.csv --counts
+    """
+    from sagline.files.table import load_readings
+
+    robot = opt.robot_with_payload(name, payload)
+    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    times, lengths = load_readings(file, "count" if counts else "length", robot.cable_count, size)
+    if counts:
+        lengths = sl.lengths_from_counts(robot, lengths)
+    table = "-poses.csv"
+    output = Output(folder, file_stem(robot.name), [table] * write_table)
+    with working(f"{robot.name}: finding {len(lengths):,} poses") as line:
+        first = sl.forward(robot, lengths[0], model=model.build(), wrench=wrench)
+        start = first.pose if np.isfinite(first.pose.position).all() else None
+        found = sl.forward(robot, lengths, start, model.build(), wrench, progress=line.progress)
+    rows = _rows(times, found)
+    if write_table:
+        output.table(table, rows)
+    lost = [
+        k for k, status in enumerate(found.status) if status not in (sl.ForwardStatus.SOLVED, sl.ForwardStatus.FITTED)
+    ]
+    if as_json:
+        header = [str(cell).split(" ")[0] for cell in rows[0]]
+        file_of_poses = output.files[0] if output.files else None
+        show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": file_of_poses})
+    else:
+        count = len(rows) - 1
+        many = f"All {count:,}" if not lost else f"{count - len(lost):,} of {count:,}"
+        show_table(_grid(rows), f"{many} samples have a pose in stable equilibrium.")
+        if count > SHOWN:
+            show_text(f"The first {SHOWN} of {count:,} samples; the CSV file has all of them.")
+        output.show()
+    if not lost:
+        return 0
+    status = sl.ForwardStatus(int(found.status[lost[0]]))
+    show_note(
+        f"{len(lost)} of {len(found.status)} samples, the first in row {lost[0] + 1}: ", status.text, style="bold red"
+    )
+    return OUTSIDE
+
+
+def _rows(times: Array | None, found: sl.ForwardSolution) -> list[list[Cell]]:
+    """The header, then one row per sample; rows have the time if the input file has it."""
+    units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}
+    numbers = np.hstack((found.pose.position, found.pose.quaternion, found.wrench_residual)).tolist()
+    words = [sl.ForwardStatus(int(code)).name for code in found.status]
+    body = [[*row, steps, word] for row, steps, word in zip(numbers, found.iterations.tolist(), words, strict=True)]
+    header = [f"{name} [{units[name]}]" if name in units else name for name in (*COLUMNS, "status")]
+    if times is None:
+        return [header, *body]
+    return [["time [s]", *header], *([time, *row] for time, row in zip(times.tolist(), body, strict=True))]
+
+
+def _grid(rows: list[list[Cell]]) -> TextTable:
+    """The first samples; each row begins with its time or number."""
+    header, body = [str(name) for name in rows[0]], rows[1 : SHOWN + 1]
+    texts = [[cell if isinstance(cell, str) else number_text(cell, ".6g") for cell in row] for row in body]
+    if not header[0].startswith("time"):
+        header, texts = ["sample", *header], [[str(k), *row] for k, row in enumerate(texts)]
+    return TextTable(header, texts, left=frozenset({len(header) - 1}))

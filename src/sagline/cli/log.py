@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, OutOption, TableOption, argument, only_with, option
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_json, show_text, working
 from sagline.core.numbers import n
@@ -29,10 +30,10 @@ BAR: Final = 30  # length of the longest bar of the histogram, in characters
 
 
 def log(
-    file: Annotated[Path, argument("RUN.mcap", "A log of the controller, also of a controller that was killed.")],
+    file: Annotated[Path, opt.argument("RUN.mcap", "A log of the controller, also of a controller that was killed.")],
     to: Annotated[
         Path | None,
-        option(
+        opt.option(
             "FILE",
             "Write a file instead of printing: .nc is a data set with the plan; .mcap is a complete log.",
             "--to",
@@ -40,11 +41,11 @@ def log(
     ] = None,
     plan: Annotated[
         str | None,
-        option("NUMBER", "Only the cycles of this plan; numbers start at 0. Default: all cycles.", "--plan-number"),
+        opt.option("NUMBER", "Only the cycles of this plan; numbers start at 0. Default: all cycles.", "--plan-number"),
     ] = None,
-    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
-    write_table: TableOption = False,
-    as_json: JsonOption = False,
+    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
+    write_table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
 ) -> int:
     """Print the contents of a log of the controller: states, largest errors, late cycles, events.
 
@@ -54,15 +55,14 @@ def log(
         sagline log run.mcap --to run.nc
         sagline log killed.mcap --to corrected.mcap
     """
-    from sagline.cli.values import whole_of
-    from sagline.files.execution_file import load_execution, save
+    from sagline.files.execution_file import save
 
-    which = None if plan is None else whole_of(plan, "--plan-number", 0, MOST_PLANS)
+    which = None if plan is None else opt.whole_of(plan, "--plan-number", 0, MOST_PLANS)
     if to is not None:
         check_file(to)
     output = Output(folder, file.stem, [TABLE] * write_table)
     with working(f"reading {file.name}"):
-        done = load_execution(file, which)
+        done = sl.load_execution(file, which)
     if to is not None:
         with working(f"writing {to.name}"):
             save(done, to)

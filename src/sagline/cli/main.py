@@ -32,12 +32,18 @@ GROUPS = {  # the subcommands in the order in which the help lists them
     "Installation": ("examples", "cache"),
 }
 NAMES = tuple(chain.from_iterable(GROUPS.values()))
-MODULES = {
-    "encoder": "lengths",
+MODULES = {  # modules of the subcommands whose module has another name
     "show": "robots",
-    "export-c": "export",
-    "export-scl": "export",
-}  # types of parameters, or names of these types
+    "encoder": "lengths",
+    "forward": "lengths",
+    "twin": "control",
+    "export-c": "convert",
+    "export-scl": "convert",
+    "run": "article",
+    "experiment": "article",
+    "examples": "installation",
+    "cache": "installation",
+}
 FORMER = {  # former names of options, by command; they remain valid
     "convert": {"--format": "--kind"},
     "log": {"--plan": "--plan-number"},

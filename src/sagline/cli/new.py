@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import re
 import sys
+from math import prod
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
-from sagline.cli.options import ForceOption, argument, flag, option
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.terminal import show_note, show_text, working
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.cli.view import ServerAddress, view_robot
 from sagline.core.numbers import n
 from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
-    from sagline.kinematics.plan import Plan
     from sagline.robot.catalogue import Design
-    from sagline.robot.pose import Pose, PoseBox
-    from sagline.robot.robot import Robot
 
 MIDDLE = 0.5  # box of the printed feasible share: its edges relative to those of the frame
-GRID = 7  # number of poses along each edge of this box and of the test box
+GRID = (7, 7, 7)  # numbers of poses along the edges of this box and of the test box
 NEARLY_ALL = 0.95  # smallest feasible share in the test box of the file
 _BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # boxes to try in this order: their edges relative to those of the frame
 
@@ -45,16 +43,16 @@ QUESTIONS = {  # text of the question and default, by the name of the option
 
 
 def new(
-    file: Annotated[Path, argument("FILE", "The robot file to write, my_robot.yaml.")],
-    frame: Annotated[str | None, option("SIZE", 'Edges of the frame, "6 x 4 x 3 m".')] = None,
-    layout: Annotated[str | None, option("LAYOUT", "top: cables from above; mixed: from above and below.")] = None,
-    cables: Annotated[str | None, option("NUMBER", "Number of cables, 6 to 8.")] = None,
-    platform: Annotated[str | None, option("SIZE", 'Edges of the platform, "0.5 x 0.5 x 0.4 m".')] = None,
-    mass: Annotated[str | None, option("MASS", 'Mass of the platform with its load, "30 kg".')] = None,
-    rope: Annotated[str | None, option("ROPE", f"Rope of the cables: {ROPE_NAMES}.")] = None,
-    diameter: Annotated[str | None, option("LENGTH", 'Diameter of the rope, "4 mm".')] = None,
-    force: ForceOption = False,
-    look: Annotated[bool, flag("Show it in the browser afterwards.", "--view")] = False,
+    file: Annotated[Path, opt.argument("FILE", "The robot file to write, my_robot.yaml.")],
+    frame: Annotated[str | None, opt.option("SIZE", 'Edges of the frame, "6 x 4 x 3 m".')] = None,
+    layout: Annotated[str | None, opt.option("LAYOUT", "top: cables from above; mixed: from above and below.")] = None,
+    cables: Annotated[str | None, opt.option("NUMBER", "Number of cables, 6 to 8.")] = None,
+    platform: Annotated[str | None, opt.option("SIZE", 'Edges of the platform, "0.5 x 0.5 x 0.4 m".')] = None,
+    mass: Annotated[str | None, opt.option("MASS", 'Mass of the platform with its load, "30 kg".')] = None,
+    rope: Annotated[str | None, opt.option("ROPE", f"Rope of the cables: {ROPE_NAMES}.")] = None,
+    diameter: Annotated[str | None, opt.option("LENGTH", 'Diameter of the rope, "4 mm".')] = None,
+    force: opt.ForceOption = False,
+    look: Annotated[bool, opt.flag("Show it in the browser afterwards.", "--view")] = False,
 ) -> int:
     r"""Make a robot file of your own; the command asks for missing options, checks the robot and describes it.
 
@@ -66,7 +64,7 @@ def new(
         sagline new my_robot.yaml --frame "15 x 11 x 6 m" --mass "50 kg" \
             --rope steel-6x19 --diameter "3 mm"
     """
-    from sagline.files.robot_file import dump_robot, parse_robot
+    from sagline.files.robot_file import parse_robot
 
     answers = {
         "frame": frame, "layout": layout, "cables": cables, "platform": platform, "mass": mass, "rope": rope,
@@ -74,9 +72,9 @@ def new(
     }  # fmt: skip
     _check_file(file, force=force)
     design, said = _answered(file.stem, answers)
-    with working(f"checking {GRID**3} poses of each of a few boxes"):
+    with working(f"checking {prod(GRID)} poses of each of a few boxes"):
         robot, middle = _boxed(design)
-    text = _header(said) + dump_robot(robot)
+    text = _header(said) + sl.dump_robot(robot)
     made = parse_robot(text, file)
     write_text(file, text)
     with working("checking the robot"):
@@ -93,17 +91,14 @@ def new(
         show_text(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
     if not look:
         return 0
-    from sagline.cli.hosting import ServerAddress
-    from sagline.cli.view import view_robot
-
     return view_robot(made, file, ServerAddress("127.0.0.1", 8080, browser=True))
 
 
 def _check_file(file: Path, *, force: bool) -> None:
     if file.suffix not in (".yaml", ".yml"):
-        raise FileError(file, "is not a valid name for a robot file", "Let it end in .yaml.")
+        raise sl.FileError(file, "is not a valid name for a robot file", "Let it end in .yaml.")
     if file.exists() and not force:
-        raise FileError(file, "exists", "Choose another name, or replace it with --force.")
+        raise sl.FileError(file, "exists", "Choose another name, or replace it with --force.")
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
@@ -121,7 +116,7 @@ def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[s
                 text = _read(key, question, default)
             try:
                 design = _design(name, {**said, key: text})
-            except InvalidValueError as error:
+            except sl.InvalidValueError as error:
                 if given is not None or not asks:
                     raise
                 show_note("No: ", str(error), style="bold red")
@@ -135,10 +130,9 @@ def _read(key: str, question: str, default: str) -> str:
     line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
     if line:
         return line.strip() or default
-    option = f"--{key}"
     allowed = f'an option, or a line that answers "{question}"'
-    step = f'Add {option} "{default}", for instance.'
-    raise InvalidValueError(option, "missing: the input ended", allowed, step)
+    step = f'Add --{key} "{default}", for instance.'
+    raise sl.InvalidValueError(f"--{key}", "missing: the input ended", allowed, step)
 
 
 def _design(name: str, said: dict[str, str]) -> Design:
@@ -169,7 +163,7 @@ def _count(text: str, layout: str) -> int:
 
     if not re.fullmatch(r"[0-9]{1,3}", text.strip()):
         allowed = " or ".join(map(str, COUNTS.get(layout, (6, 7, 8))))
-        raise InvalidValueError("cables", repr(text), allowed, "Give a whole number.")
+        raise sl.InvalidValueError("cables", repr(text), allowed, "Give a whole number.")
     return int(text)
 
 
@@ -180,32 +174,21 @@ def _edges(text: str, item: str) -> Array:
 
     parts = [part.strip() for part in text.replace("×", "x").split("x")]
     if len(parts) != 3:
-        raise InvalidValueError(item, repr(text), 'three edges, such as "6 x 4 x 3 m"', f"Correct {item}.")
+        raise sl.InvalidValueError(item, repr(text), 'three edges, such as "6 x 4 x 3 m"', f"Correct {item}.")
     unit = parts[2].lstrip("0123456789.+-eE ")
     edges = in_si([part if part[-1:].isalpha() or not unit else f"{part} {unit}" for part in parts], "m", item)
     return checked(edges, item, "m", shape=(3,), above=0.0)
 
 
-def _boxed(design: Design) -> tuple[Robot, Plan]:
+def _boxed(design: Design) -> tuple[sl.Robot, sl.Plan]:
     """The robot with the largest test box that has enough feasible poses, and the plan in the middle of the frame."""
-    from sagline.kinematics.inverse import inverse
-
     robot = design.robot()
-    middle = inverse(robot, grid(design.placed(MIDDLE)))
+    middle = sl.inverse(robot, opt.level_grid(design.placed(MIDDLE), GRID))
     for share in _BOXES:
         box = design.placed(share)
-        if inverse(robot, grid(box)).feasible.mean() >= NEARLY_ALL:
+        if sl.inverse(robot, opt.level_grid(box, GRID)).feasible.mean() >= NEARLY_ALL:
             return robot.replace(test_box=box), middle
     return robot, middle
-
-
-def grid(box: PoseBox) -> Pose:
-    """Level poses on a grid in a box, GRID cubed of them as one batch."""
-    from sagline.robot.pose import Pose
-
-    axes = [np.linspace(low, high, GRID) for low, high in zip(box.low, box.high, strict=True)]
-    places: Array = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return Pose.from_quaternion(places, np.array([0.0, 0.0, 0.0, 1.0]))
 
 
 def _header(said: dict[str, str]) -> str:
@@ -213,7 +196,7 @@ def _header(said: dict[str, str]) -> str:
     return f"# made by sagline new: {made}\n# values in SI units; a quantity may also have its unit, 22 mm^2\n"
 
 
-def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
+def _explained(robot: sl.Robot, design: Design, middle: sl.Plan) -> tuple[list[str], float]:
     """Lines about the robot, with the feasible share of the poses in the middle of its frame."""
     from sagline.cables.cable import ROPES, SAFETY
     from sagline.robot.catalogue import SLACK_LIMIT

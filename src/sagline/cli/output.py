@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, starmap
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
@@ -22,39 +22,30 @@ from sagline.cli.terminal import FREE, show_json, show_pieces, show_text
 from sagline.core.errors import FileError, printable
 from sagline.files.writing import check_files, check_folder, create_folder, write_text
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+FigureMaker = Callable[[], Any]  # makes a figure of matplotlib, or the axes of one
 
 ENDING = re.compile(r"\.[a-z]{1,5}", re.IGNORECASE)  # suffix by which --out is recognized as a file
 
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table of texts. A table that is too wide is split into pieces between its columns; cells are never shortened.
+    """A table of texts. Pieces of a table that is too wide repeat its first column; cells are never shortened."""
 
-    Attributes:
-        heads: Heads of the columns; a head may have several lines.
-        rows: Rows, each with one text per column.
-        title: Title of the table; "" for none.
-        keys: Number of first columns that name the row; each piece repeats them.
-        left: Indices of the left-aligned columns; all others are right-aligned.
-        prose: Indices of the columns whose cells may be broken into several lines.
-    """
-
-    heads: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    title: str = ""
-    keys: int = 1
+    heads: Sequence[str]  # heads of the columns; a head may have several lines
+    rows: Sequence[Sequence[str]]  # rows, each with one text per column
+    title: str = ""  # title of the table; "" for none
+    # indices of the left-aligned columns; all others are right-aligned
     left: frozenset[int] = field(default=frozenset({0}))
+    # indices of the columns whose cells may be broken into several lines
     prose: frozenset[int] = field(default=frozenset())
 
     def pieces(self, console: Console, width: int) -> list[tuple[Table, int]]:
         """The pieces of the table: as few as fit the width, each with about the same number of columns."""
         full = self._filled(console, width)
-        even = list(_split(range(self.keys, len(self.heads)), len(full)))
+        edges = [1 + (len(self.heads) - 1) * k // len(full) for k in range(len(full) + 1)]
+        even = list(starmap(range, pairwise(edges)))
         for parts in (even, full):  # distribute the columns evenly if this does not need more pieces
-            tables = [self._table([*range(self.keys), *part], first=part[0] == self.keys) for part in parts]
+            tables = [self._table([0, *part], first=part[0] == 1) for part in parts]
             pieces = [(table, _least(console, table)) for table in tables]
             if all(least <= width for _, least in pieces):
                 break
@@ -62,11 +53,11 @@ class TextTable:
 
     def _filled(self, console: Console, width: int) -> list[range]:
         """Columns of each piece: as many consecutive columns as fit into `width`, and at least one."""
-        parts, first, count = [], self.keys, len(self.heads)
+        parts, first, count = [], 1, len(self.heads)
         while first < count:
             end = first + 1
             while end < count:
-                wider = self._table([*range(self.keys), *range(first, end + 1)], first=False)
+                wider = self._table([0, *range(first, end + 1)], first=False)
                 if _least(console, wider) > width:
                     break
                 end += 1
@@ -104,15 +95,14 @@ def _least(console: Console, table: Table) -> int:
     return Measurement.get(console, console.options.update_width(FREE), table).minimum
 
 
-def _split(columns: range, count: int) -> Iterable[range]:
-    """Consecutive parts of the columns; the sizes of the parts differ by at most one."""
-    edges = [len(columns) * k // count for k in range(count + 1)]
-    return [columns[first:end] for first, end in pairwise(edges)]
-
-
 def number_text(number: float, form: str) -> str:
     """A number with a true minus sign; a dash for NaN."""
     return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no negative zero
+
+
+def values_of(thing: object, *names: str) -> dict[str, Any]:
+    """Attributes of an object for JSON. In `names`, the unit may follow the name of an attribute: "position_m"."""
+    return {name: getattr(thing, name if hasattr(thing, name) else name.rpartition("_")[0]) for name in names}
 
 
 def is_file(out: Path) -> bool:
@@ -184,7 +174,7 @@ class Output:
 
         write_text(self.file(part), csv_text(rows))
 
-    def draw(self, *figures: Callable[[], Figure | Axes]) -> None:
+    def draw(self, *figures: FigureMaker) -> None:
         """Make figures in the chosen style, and save them under the checked names; both have the same order."""
         from sagline.plot import save
 

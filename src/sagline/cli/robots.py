@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, OutOption, RobotArgument, TableOption, only_with
-from sagline.cli.output import Output, TextTable, show_table
+import sagline as sl
+from sagline.cli import options as opt
+from sagline.cli.output import Output, TextTable, show_table, values_of
 from sagline.cli.terminal import show_json, show_text
 from sagline.core.numbers import n
+from sagline.files.writing import file_stem
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
-    from sagline.robot.robot import Robot
-    from sagline.robot.winch import Winch
 
 WHOLE = {  # fields of the robot and their units
     "motion_pattern": "",
@@ -43,16 +43,13 @@ CABLES = "-cables.csv"
 
 
 def robots(
-    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
-    write_table: TableOption = False,
-    as_json: JsonOption = False,
+    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
+    write_table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
 ) -> None:
     """List the preset robots."""
-    from sagline.files.robot_file import load_robot
-    from sagline.robot.catalogue import robot_names
-
     output = Output(folder, "robots", [".csv"] * write_table)
-    robots = [load_robot(name) for name in robot_names()]
+    robots = [sl.load_robot(name) for name in sl.robot_names()]
     if write_table:
         sizes = [f"{what} {axis} [m]" for what in ("frame", "platform") for axis in "xyz"]
         rows = [
@@ -81,10 +78,10 @@ def robots(
 
 
 def show(
-    name: RobotArgument,
-    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
-    write_table: TableOption = False,
-    as_json: JsonOption = False,
+    name: opt.RobotArgument,
+    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
+    write_table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
 ) -> None:
     """Show every value of a robot with its unit; assumed values are marked, with the reason. --csv writes the cables.
 
@@ -93,27 +90,26 @@ def show(
         sagline show ipanema-1
         sagline show own_robot.yaml --json
     """
-    from sagline.files.robot_file import load_robot
-    from sagline.files.writing import file_stem
-
-    robot = load_robot(name)
+    robot = sl.load_robot(name)
     output = Output(folder, file_stem(robot.name), [CABLES] * write_table)
     if write_table:
         output.table(CABLES, _cables(robot))
+    record = _record(robot)
     if as_json:
-        show_json(_record(robot))
+        show_json(record)
         return
     assumed = f"; {len(robot.assumed)} values are assumed" if robot.assumed else ""
-    show_table(_values(robot), f"{robot.name}: {robot.cable_count} cables, {n(robot.mass, '.4g', 'kg')}{assumed}.")
-    if robot.winches is not None:
-        show_table(_winches(robot, robot.winches))
-    show_table(_anchors(robot))
-    if robot.tolerances:
-        show_table(_deviations(robot.tolerances, "tolerance"))
+    values = _listing({field: record[field] for field in WHOLE}, _text, robot.name)
+    show_table(values, f"{robot.name}: {robot.cable_count} cables, {n(robot.mass, '.4g', 'kg')}{assumed}.")
+    if (winches := record["winches"]) is not None:
+        show_table(_listing(winches["value"], _winch_text, _marked("winches", winches)))
+    show_table(_anchors(record))
+    if record["tolerances"]:
+        show_table(_listing(record["tolerances"], _deviation_text, "", "tolerance"))
     if (known := robot.calibration) is not None:
         source, note = (f" from {known.log}" * bool(known.log), f": {known.note}" * bool(known.note))
         show_text(f"Calibrated on {known.date}{source}{note}")
-        show_table(_deviations(known.standard_error, "standard error"))
+        show_table(_listing(record["calibration"]["standard_error"], _deviation_text, "", "standard error"))
     for label, text in (("Source", robot.source), ("Notes", robot.notes)):
         if text:
             show_text(f"{label}:")
@@ -125,7 +121,7 @@ def show(
     output.show()
 
 
-def _cables(robot: Robot) -> list[list[object]]:
+def _cables(robot: sl.Robot) -> list[list[object]]:
     """The heads of the columns, then anchors, material and limits of each cable; cells of unknown values are empty."""
     heads = ["cable", *(f"{field} {axis} [{unit}]" for field, unit in ANCHORS.items() for axis in "xyz")]
     known = {field: np.asarray(value) for field in PER_CABLE if (value := _value(robot, field)) is not None}
@@ -138,7 +134,7 @@ def _cables(robot: Robot) -> list[list[object]]:
     ]
 
 
-def _short(robot: Robot) -> dict[str, Any]:
+def _short(robot: sl.Robot) -> dict[str, Any]:
     return {
         "name": robot.name,
         "cables": robot.cable_count,
@@ -150,7 +146,7 @@ def _short(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _frame(robot: Robot) -> Array:
+def _frame(robot: sl.Robot) -> Array:
     """Edge lengths of the frame. Without a frame, those of the box around the anchors and down to the floor."""
     if robot.frame_size is not None:
         return robot.frame_size
@@ -159,7 +155,7 @@ def _frame(robot: Robot) -> Array:
     return np.array([*(high - low)[:2], high[2] - floor])
 
 
-def _platform(robot: Robot) -> Array:
+def _platform(robot: sl.Robot) -> Array:
     """Edge lengths of the platform. If they are not given, edge lengths of the box that encloses its anchors."""
     extent: Array = np.ptp(robot.platform_anchors, axis=0)
     return extent if robot.platform_size is None else robot.platform_size
@@ -169,15 +165,19 @@ def _edges(size: Array) -> str:
     return " × ".join(f"{edge:.3g}" for edge in size)
 
 
-def _value(robot: Robot, field: str) -> Any:
+def _value(robot: sl.Robot, field: str) -> Any:
     return getattr(robot.cables if field in MATERIAL else robot, field)
 
 
-def _assumption(robot: Robot, field: str) -> str | None:
+def _assumption(robot: sl.Robot, field: str) -> str | None:
     return robot.assumed.get("cables" if field in MATERIAL else field)
 
 
-def _record(robot: Robot) -> dict[str, Any]:
+def _record(robot: sl.Robot) -> dict[str, Any]:
+    """All values with their units; `show` prints them, too."""
+    from sagline.core.fields import units
+    from sagline.robot.tolerances import UNCERTAIN
+
     record: dict[str, Any] = {"name": robot.name, "source": robot.source, "notes": robot.notes}
     for field, unit in (WHOLE | ANCHORS).items():
         value = _value(robot, field)
@@ -186,74 +186,54 @@ def _record(robot: Robot) -> dict[str, Any]:
         record[field] = {"value": value, "unit": unit}
         if (why := _assumption(robot, field)) is not None and value is not None:
             record[field]["assumed"] = why
-    record["winches"] = None if robot.winches is None else {"unit": "", "value": _parts(robot.winches)}
-    if robot.winches is not None and "winches" in robot.assumed:
-        record["winches"]["assumed"] = robot.assumed["winches"]
-    record["tolerances"] = _parts_of(robot.tolerances) or None
+    record["winches"] = None
+    if robot.winches is not None:
+        record["winches"] = {"unit": "", "value": _with_units(robot.winches.known(), units(sl.Winch) | {"guides": ""})}
+        if "winches" in robot.assumed:
+            record["winches"]["assumed"] = robot.assumed["winches"]
+    uncertain = {name: each.unit for name, each in UNCERTAIN.items()}
+    record["tolerances"] = _with_units(robot.tolerances, uncertain) or None
     record["calibration"] = None
     if (known := robot.calibration) is not None:
-        errors = _parts_of(known.standard_error)
-        record["calibration"] = {"log": known.log, "date": known.date, "note": known.note, "standard_error": errors}
+        errors = _with_units(known.standard_error, uncertain)
+        record["calibration"] = {**values_of(known, "log", "date", "note"), "standard_error": errors}
     return record
 
 
-def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
-    """The robot's standard deviations, each with its unit."""
-    from sagline.robot.tolerances import UNCERTAIN
-
-    return {
-        name: {"value": value, "unit": UNCERTAIN[name].unit.replace("^2", "²")} for name, value in deviations.items()
-    }
+def _with_units(values: Mapping[str, Any], unit: Mapping[str, str]) -> dict[str, Any]:
+    return {name: {"value": value, "unit": unit[name].replace("^2", "²")} for name, value in values.items()}
 
 
-def _deviations(deviations: Mapping[str, Array], head: str) -> TextTable:
-    """Table of the standard deviations; a field with equal values has one number."""
-    from sagline.robot.tolerances import UNCERTAIN
-
-    rows = []
-    for name, value in deviations.items():
-        alike = bool((value == value.flat[0]).all())
-        text = f"{value.flat[0]:.4g}" if alike else "\n".join(_numbers(row, 4) for row in np.atleast_2d(value))
-        rows.append([name.replace("_", " "), text, UNCERTAIN[name].unit])
-    return TextTable(["", head, "unit"], rows, left=frozenset(range(3)), prose=frozenset({1}))
-
-
-def _parts(winches: Winch) -> dict[str, Any]:
-    """Known values of the winches, each with its unit."""
-    from sagline.core.fields import units
-    from sagline.robot.winch import Winch
-
-    unit = units(Winch) | {"guides": ""}
-    return {name: {"value": value, "unit": unit[name].replace("^2", "²")} for name, value in winches.known().items()}
-
-
-def _marked(robot: Robot, field: str) -> str:
-    mark = "" if _assumption(robot, field) is None else " *"
-    return field.replace("_", " ") + mark
-
-
-def _values(robot: Robot) -> TextTable:
+def _listing(entries: Mapping[str, Any], text: Callable[[str, Any], str], title: str, head: str = "value") -> TextTable:
+    """Table of the known values of a record, as texts; assumed values are marked."""
     rows = [
-        [_marked(robot, field), _text(field, value), unit]
-        for field, unit in WHOLE.items()
-        if (value := _value(robot, field)) is not None
+        [_marked(name, entry), text(name, entry["value"]), entry["unit"]]
+        for name, entry in entries.items()
+        if entry["value"] is not None
     ]
-    return TextTable(["", "value", "unit"], rows, robot.name, left=frozenset(range(3)), prose=frozenset({1}))
+    return TextTable(["", head, "unit"], rows, title, left=frozenset(range(3)), prose=frozenset({1}))
 
 
-def _winches(robot: Robot, winches: Winch) -> TextTable:
-    parts = _parts(winches)
-    ways = ["up" if axis[2] > 0.0 else "down" for axis in winches.swivel_axis]
-    parts["swivel_axis"]["value"] = ways if len(set(ways)) > 1 else ways[0]
-    rows = [[name.replace("_", " "), _spread(entry["value"], digits=9), entry["unit"]] for name, entry in parts.items()]
-    title = _marked(robot, "winches")
-    return TextTable(["", "value", "unit"], rows, title, left=frozenset(range(3)), prose=frozenset({1}))
+def _marked(name: str, entry: Mapping[str, Any]) -> str:
+    return name.replace("_", " ") + " *" * ("assumed" in entry)
 
 
-def _spread(value: Any, digits: int = 5) -> str:
-    """One value if it is the same for all cables, otherwise all values; counts need more digits than lengths."""
-    if isinstance(value, str | list):
-        return value if isinstance(value, str) else f"({', '.join(value)})"
+def _deviation_text(_: str, value: Array) -> str:
+    """Text of a standard deviation; a field with equal values has one number."""
+    if (value == value.flat[0]).all():
+        return f"{value.flat[0]:.4g}"
+    return "\n".join(_numbers(row, 4) for row in np.atleast_2d(value))
+
+
+def _winch_text(field: str, value: Any) -> str:
+    if field == "swivel_axis":
+        ways = ["up" if axis[2] > 0.0 else "down" for axis in value]
+        return f"({', '.join(ways)})" if len(set(ways)) > 1 else ways[0]
+    return value if isinstance(value, str) else _spread(value, digits=9)  # counts need more digits than lengths
+
+
+def _spread(value: Array, digits: int = 5) -> str:
+    """One value if it is the same for all cables, otherwise all values."""
     return f"{value[0]:.{digits}g}" if np.all(value == value[0]) else _numbers(value, digits)
 
 
@@ -261,7 +241,8 @@ def _text(field: str, value: Any) -> str:
     if field == "inertia" and not np.any(value - np.diag(np.diag(value))):
         return f"diagonal {_numbers(np.diag(value))}"
     if field == "test_box":
-        return f"{_numbers(value.low)} to {_numbers(value.high)}, tilted by up to {np.degrees(value.tilt):.3g}°"
+        tilt = np.degrees(value["tilt_rad"])
+        return f"{_numbers(value['low'])} to {_numbers(value['high'])}, tilted by up to {tilt:.3g}°"
     if field.endswith("size"):
         return " × ".join(f"{edge:g}" for edge in value)
     if field in PER_CABLE:
@@ -275,7 +256,8 @@ def _numbers(row: Any, digits: int = 5) -> str:
     return "(" + ", ".join(f"{number:.{digits}g}" for number in row) + ")"
 
 
-def _anchors(robot: Robot) -> TextTable:
-    heads = ["cable", *(f"{_marked(robot, field)} [{unit}]" for field, unit in ANCHORS.items())]
-    rows = [[str(k), *(_numbers(_value(robot, field)[k]) for field in ANCHORS)] for k in range(robot.cable_count)]
+def _anchors(record: Mapping[str, Any]) -> TextTable:
+    heads = ["cable", *(f"{_marked(field, record[field])} [{unit}]" for field, unit in ANCHORS.items())]
+    ends = zip(*(record[field]["value"] for field in ANCHORS), strict=True)
+    rows = [[str(k), *map(_numbers, both)] for k, both in enumerate(ends)]
     return TextTable(heads, rows, left=frozenset({1, 2}))

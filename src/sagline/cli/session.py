@@ -13,14 +13,16 @@ from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.terminal import show_note, show_text
-from sagline.cli.values import middle_pose, quantity, whole_of
+from sagline.cli.values import quantity
 from sagline.control.controller import Controller
 from sagline.control.real_time import interrupt_calls
 from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array
-from sagline.core.errors import InvalidValueError, SaglineError, nearest
+from sagline.core.errors import nearest
 from sagline.files.path_file import load_path
 from sagline.files.pose_text import pose_of_text
 from sagline.robot.pose import Pose
@@ -177,11 +179,11 @@ class OperatorSession:
             if word not in self._words:
                 near = nearest(word, self._words)
                 step = f"Did you mean {near}?" if near else "help lists them."
-                raise InvalidValueError("the line", repr(text), "one that begins with a known word", step)
+                raise sl.InvalidValueError("the line", repr(text), "one that begins with a known word", step)
             _, _, parse, act = self._words[word]
             arguments = parse(rest.strip())
             return _Line(text, act if parse is _nothing else partial(act, arguments))
-        except SaglineError as error:
+        except sl.SaglineError as error:
             return _Line(text, partial(_refuse, error))
 
     def _interrupt(self) -> None:
@@ -229,7 +231,7 @@ class OperatorSession:
             show_text(f"{PROMPT}{line.text}", whole=True)
         try:
             line.act()
-        except SaglineError as error:
+        except sl.SaglineError as error:
             if self._alone:
                 raise
             show_note("Error: ", str(error), style="bold red")
@@ -243,7 +245,7 @@ class OperatorSession:
         """The pose at which to home; None confirms the last pose."""
         if text == CONFIRM:
             return None
-        return _pose("home", text) if text else middle_pose(self.control.robot)
+        return _pose("home", text) if text else opt.middle_pose(self.control.robot)
 
     def _home(self, pose: Pose | None) -> None:
         if pose is None:
@@ -256,7 +258,9 @@ class OperatorSession:
         by = quantity(far, "jog: LENGTH", "m")
         if which in AXES:
             return partial(self.control.start_jog_platform, [by * (axis == which) for axis in AXES])
-        return partial(self.control.start_jog, whole_of(which, "jog: WINCH", 0, self.control.robot.cable_count - 1), by)
+        return partial(
+            self.control.start_jog, opt.whole_of(which, "jog: WINCH", 0, self.control.robot.cable_count - 1), by
+        )
 
     def _cycles(self, text: str) -> int:
         return round(quantity(text, "wait", "s", low=0.0) / self.control.period)
@@ -310,7 +314,7 @@ class OperatorSession:
 
 def _pose(item: str, text: str) -> Pose:
     if not text:
-        raise InvalidValueError(item, "without a pose", "X,Y,Z or X,Y,Z,A,B,C", f"Enter {item} 0.2,-0.4,1.4.")
+        raise sl.InvalidValueError(item, "without a pose", "X,Y,Z or X,Y,Z,A,B,C", f"Enter {item} 0.2,-0.4,1.4.")
     return pose_of_text(text, item, f"Give meters, and degrees about z, y and x: {item} 0.2,-0.4,1.4.")
 
 
@@ -328,10 +332,10 @@ def _call(action: Callable[[], object]) -> None:
 
 def _nothing(text: str) -> None:
     if text:
-        raise InvalidValueError("the line", f"followed by {text!r}", "that word alone", "Leave it out.")
+        raise sl.InvalidValueError("the line", f"followed by {text!r}", "that word alone", "Leave it out.")
 
 
-def _refuse(error: SaglineError) -> None:
+def _refuse(error: sl.SaglineError) -> None:
     raise error
 
 

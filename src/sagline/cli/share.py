@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.options import argument, out_option, robot_completions
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.output import file_of, is_file
 from sagline.cli.terminal import show_text, working
-from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.writing import check_file, create_folder, write_text
+from sagline.files.writing import check_file, create_folder, file_stem, write_text
 
 if TYPE_CHECKING:
-    from sagline.robot.robot import Robot
     from sagline.share.course import SharedMotion
 
 ENDINGS: Final = (".html", ".htm")
@@ -22,14 +21,14 @@ HEAD: Final = 2000  # number of bytes at the start of a page that contain its ma
 def share(
     what: Annotated[
         str,
-        argument(
+        opt.argument(
             "WHAT",
             "A run or a simulation, run.nc, or a log of the controller, run.mcap: the page plays it. A preset (see "
             "sagline robots) or a robot file, robot.yaml: the platform can be dragged.",
-            robot_completions,
+            opt.robot_completions,
         ),
     ],
-    out: Annotated[Path | None, out_option("run.html or ROBOT.html here")] = None,
+    out: Annotated[Path | None, opt.out_option("run.html or ROBOT.html here")] = None,
 ) -> None:
     """Write a robot or a run as one HTML page that needs no server and no network: for a phone, a mail, a lecture.
 
@@ -44,21 +43,19 @@ def share(
         sagline share output/cogiro-catenary.nc
         sagline share run.mcap
     """
-    from sagline.files.writing import file_stem
-    from sagline.robot.robot import Robot
-    from sagline.share.calls import check_module
+    from sagline.share.packing import check_module
     from sagline.share.page import course_page, robot_page
 
     check_module()
     source = Path(what)
     if out is not None and is_file(out) and out.suffix.lower() not in ENDINGS:
-        raise FileError(out, "is not a valid name for a page", "Let it end in .html.")
+        raise sl.FileError(out, "is not a valid name for a page", "Let it end in .html.")
     with working(f"reading {source.name}"):
         found = _found(source)
-    robot = found if isinstance(found, Robot) else found.robot
+    robot = found if isinstance(found, sl.Robot) else found.robot
     stem = file_stem(robot.name) if source.suffix == "" else source.stem
     target = _free(Path(f"{stem}.html")) if out is None else check_file(file_of(out, f"{stem}.html"))
-    text = robot_page(found) if isinstance(found, Robot) else course_page(found, source.stem)
+    text = robot_page(found) if isinstance(found, sl.Robot) else course_page(found, source.stem)
     create_folder(target.parent)
     write_text(target, text)
     size = len(text.encode())
@@ -66,30 +63,26 @@ def share(
     show_text(f"{target.resolve()}: {amount}, opens in any browser, without a network", whole=True)
 
 
-def _found(source: Path) -> Robot | SharedMotion:
+def _found(source: Path) -> sl.Robot | SharedMotion:
     """The robot of the argument, or the run to play."""
     from sagline.files.calibration_file import FORMAT as CALIBRATION
-    from sagline.files.calibration_file import load_calibration
     from sagline.files.netcdf import is_of
-    from sagline.files.plan_file import load_plan
-    from sagline.files.robot_file import load_robot
     from sagline.files.simulation_file import FORMAT as SIMULATION
-    from sagline.files.simulation_file import load_simulation
     from sagline.share.course import of_plan, of_simulation
 
     suffix = source.suffix.lower()
     if suffix == ".mcap":
         return _log(source)
     if suffix != ".nc":
-        return load_robot(str(source))
+        return sl.load_robot(str(source))
     if is_of(source, SIMULATION):
-        return of_simulation(load_simulation(source))
+        return of_simulation(sl.load_simulation(source))
     if is_of(source, CALIBRATION):
-        return load_calibration(source).robot
-    plan = load_plan(source)
+        return sl.load_calibration(source).robot
+    plan = sl.load_plan(source)
     if not plan.state.pose.shape:
         step = "Save a plan of a path, or share the robot."
-        raise InvalidValueError("run", "a plan of a single pose", "a plan of a sequence of poses", step)
+        raise sl.InvalidValueError("run", "a plan of a single pose", "a plan of a sequence of poses", step)
     return of_plan(plan)
 
 
@@ -98,10 +91,10 @@ def _log(source: Path) -> SharedMotion:
         from sagline.share.course import of_session
         from sagline.viewer.session import LogFollower
     except ModuleNotFoundError as error:
-        raise FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None
+        raise sl.FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None
     session = LogFollower(source).more()
     if session is None:
-        raise FileError(source, "has no cycle", "Record at least one cycle.")
+        raise sl.FileError(source, "has no cycle", "Record at least one cycle.")
     return of_session(session)
 
 
@@ -111,7 +104,7 @@ def _free(file: Path) -> Path:
 
     check_file(file)
     if file.exists() and MADE.encode() not in file.read_bytes()[:HEAD]:
-        raise FileError(
+        raise sl.FileError(
             file, "exists, and is not a page of sagline", "Give a name of the page with --out; it may be this name."
         )
     return file

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.options import JsonOption, argument, only_without, option, out_option
-from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
 from sagline.cli.terminal import show_json, show_note, show_text, working
-from sagline.core.errors import SaglineError
 from sagline.core.numbers import counted
 from sagline.files.writing import create_folder
 
@@ -28,18 +29,20 @@ ENDS = {
 
 
 def sweep(
-    file: Annotated[Path, argument("SWEEP.yaml", "File with robots, poses, wrenches and the quantities to compute.")],
-    out: Annotated[Path | None, out_option("SWEEP in output")] = None,
+    file: Annotated[
+        Path, opt.argument("SWEEP.yaml", "File with robots, poses, wrenches and the quantities to compute.")
+    ],
+    out: Annotated[Path | None, opt.out_option("SWEEP in output")] = None,
     workers: Annotated[
         str | None,
-        option("COUNT", "Processes on this machine. Default: one per processor."),
-        only_without("--scheduler"),
+        opt.option("COUNT", "Processes on this machine. Default: one per processor."),
+        opt.only_without("--scheduler"),
     ] = None,
     scheduler: Annotated[
         str | None,
-        option("tcp://HOST:PORT", "Use the workers of this Dask scheduler; all workers need access to the folder."),
+        opt.option("tcp://HOST:PORT", "Use the workers of this Dask scheduler; all workers need access to the folder."),
     ] = None,
-    as_json: JsonOption = False,
+    as_json: opt.JsonOption = False,
 ) -> int:
     """Compute tensions, lengths or shortfalls of every robot at every pose under every wrench.
 
@@ -52,12 +55,10 @@ def sweep(
         sagline sweep own_sweep.yaml
         sagline sweep own_sweep.yaml --workers 1 --out results/sweep
     """
-    from sagline.cli.values import whole_of
-    from sagline.sweep.file import load_sweep
     from sagline.sweep.running import MOST_WORKERS, open_matching_folder, run
 
-    count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
-    request = load_sweep(file)
+    count = None if workers is None else opt.whole_of(workers, "--workers", 1, MOST_WORKERS)
+    request = sl.load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
     Output(folder, "", ["done"])  # `Outputs` raises an error if the folder cannot be written
     parent = folder.absolute().parent
@@ -69,11 +70,13 @@ def sweep(
     what = f"{len(request):,} requests"
     try:
         with working(what) as line:
-            found = run(request, folder, count, scheduler=scheduler, progress=line.progress, tell=_tell)
+            found = run(
+                request, folder, count, scheduler=scheduler, progress=line.progress, tell=partial(show_note, "")
+            )
     except KeyboardInterrupt:
         show_note("", f"To continue: {again}")
         raise
-    except SaglineError as error:
+    except sl.SaglineError as error:
         if (folder / "done").exists():
             error.add_note(f"The finished tasks are kept. To continue: {again}")
         with suppress(OSError):  # the sweep has requests
@@ -88,10 +91,6 @@ def sweep(
     if left:
         show_note(f"{left:,} of {len(request):,} requests: ", "without a verdict", style="bold red")
     return OUTSIDE if left else 0
-
-
-def _tell(text: str) -> None:
-    show_note("", text)
 
 
 def _again(file: Path, folder: Path, workers: str | None, scheduler: str | None) -> str:
@@ -117,14 +116,6 @@ def _show(found: Sweep) -> None:
 
 
 def _record(found: Sweep) -> dict[str, object]:
-    robots, poses, wrenches = found.request.shape
-    return {
-        "folder": found.folder,
-        "robots": robots,
-        "poses": poses,
-        "wrenches": wrenches,
-        "quantities": found.request.quantities,
-        "tasks": found.tasks,
-        "seconds": found.seconds,
-        **found.counts._asdict(),
-    }
+    sizes = dict(zip(("robots", "poses", "wrenches"), found.request.shape, strict=True))
+    request = {"folder": found.folder, **sizes, "quantities": found.request.quantities}
+    return {**request, **values_of(found, "tasks", "seconds"), **found.counts._asdict()}

@@ -7,53 +7,33 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.options import (
-    USUAL_FORMATS,
-    FiguresOption,
-    FigureStyle,
-    FormatsOption,
-    JsonOption,
-    ModelName,
-    ModelOption,
-    OutOption,
-    PayloadOption,
-    PoseOption,
-    RobotArgument,
-    StyleOption,
-    TableOption,
-    TensionVariable,
-    VariableOption,
-    WrenchOption,
-)
 from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_note, show_text
-from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
+from sagline.files.writing import file_stem
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
-    from sagline.kinematics.plan import Plan
-    from sagline.robot.pose import Pose
-    from sagline.robot.robot import Robot
-    from sagline.tension.method import TensionMethod
 
 LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at a single pose, they give the tensions of other methods
 
 
 def tension(
-    name: RobotArgument,
-    pose: PoseOption = None,
-    model: ModelOption = ModelName.CATENARY,
-    variable: VariableOption = TensionVariable.CHORD,
-    wrench: WrenchOption = None,
-    payload: PayloadOption = None,
-    folder: OutOption = Path("output"),
-    figures: FiguresOption = True,
-    formats: FormatsOption = USUAL_FORMATS,
-    style: StyleOption = FigureStyle.PLAIN,
-    table: TableOption = False,
-    as_json: JsonOption = False,
+    name: opt.RobotArgument,
+    pose: opt.PoseOption = None,
+    model: opt.ModelOption = opt.ModelName.CATENARY,
+    variable: opt.VariableOption = opt.TensionVariable.CHORD,
+    wrench: opt.WrenchOption = None,
+    payload: opt.PayloadOption = None,
+    folder: opt.OutOption = Path("output"),
+    figures: opt.FiguresOption = True,
+    formats: opt.FormatsOption = opt.USUAL_FORMATS,
+    style: opt.StyleOption = opt.FigureStyle.PLAIN,
+    table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
 ) -> int:
     """Compare nine tension distribution methods at one pose, and draw their tensions into the tension polygon.
 
@@ -65,40 +45,33 @@ def tension(
         sagline tension article-mixed --pose 1,0.5,2.5
         sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
-    from sagline.cli.values import middle_pose, robot_with_payload
-    from sagline.files.writing import file_stem
-    from sagline.kinematics.inverse import inverse
-    from sagline.kinematics.polygon import tension_polygon
     from sagline.robot.reach import is_underconstrained
-    from sagline.tension.margin import capacity_margin
-    from sagline.tension.methods import METHODS, MinimumNorm
+    from sagline.tension.methods import METHODS
 
-    robot = robot_with_payload(name, payload)
-    place = middle_pose(robot) if pose is None else pose
+    robot = opt.robot_with_payload(name, payload)
+    place = opt.middle_pose(robot) if pose is None else pose
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
     parts = ["-tensions.csv"] * table
     output = Output(folder, file_stem(robot.name), parts, ["-tension"] * drawn, formats, style)
-    least = inverse(
-        robot, place, model.build(), MinimumNorm(variable.value), wrench
+    least = sl.inverse(
+        robot, place, model.build(), sl.MinimumNorm(variable.value), wrench
     )  # raises an error if no method is defined for the robot
     fewer_cables = is_underconstrained(robot)
-    plans: dict[str, Plan | None] = {"balance": least}
+    plans: dict[str, sl.Plan | None] = {"balance": least}
     if not fewer_cables:
         methods = {title: method for title, method in METHODS.items() if title not in LEFT_OUT}
         plans = {title: _plan(robot, place, model, method(variable.value), wrench) for title, method in methods.items()}
     why = reason(robot, place, least)
-    margin = None if fewer_cables else float(capacity_margin(least.state))
-    shape = tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
+    margin = None if fewer_cables else float(sl.capacity_margin(least.state))
+    shape = sl.tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
     for text in least.warnings:
         show_note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):
         show_note("No tensions: ", why, style="bold red")
         return OUTSIDE
     if shape is not None:
-        from sagline import plot
-
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
-        output.draw(lambda: plot.polygon(shape, points))
+        output.draw(lambda: sl.plot.polygon(shape, points))
     for part in parts:
         output.table(part, _rows(robot, plans))
     tensions = {title: _record(plan) for title, plan in plans.items()}
@@ -117,25 +90,22 @@ def tension(
     return 0
 
 
-def _plan(robot: Robot, pose: Pose, model: ModelName, method: TensionMethod, wrench: Array | None) -> Plan | None:
+def _plan(
+    robot: sl.Robot, pose: sl.Pose, model: opt.ModelName, method: sl.TensionMethod, wrench: Array | None
+) -> sl.Plan | None:
     """The plan of a method; None if the method is not defined for the robot."""
-    from sagline.kinematics.inverse import inverse
-
     try:
-        return inverse(robot, pose, model.build(), method, wrench)
-    except InvalidValueError:
+        return sl.inverse(robot, pose, model.build(), method, wrench)
+    except sl.InvalidValueError:
         return None
 
 
-def reason(robot: Robot, pose: Pose, plan: Plan) -> str:
+def reason(robot: sl.Robot, pose: sl.Pose, plan: sl.Plan) -> str:
     """Sentence on an infeasible pose: its shortfall and limiting cables, or the motion that no cable resists."""
-    from sagline.kinematics.status import PoseStatus
-    from sagline.tension.margin import unresisted_motion
-
-    status = PoseStatus(int(plan.status))
-    if status is PoseStatus.SINGULAR:
-        return f"{status.text}. No cable resists {unresisted_motion(robot, pose).text}"
-    if status is PoseStatus.INFEASIBLE:
+    status = sl.PoseStatus(int(plan.status))
+    if status is sl.PoseStatus.SINGULAR:
+        return f"{status.text}. No cable resists {sl.unresisted_motion(robot, pose).text}"
+    if status is sl.PoseStatus.INFEASIBLE:
         cables = "blocking cables " + ", ".join(str(i) for i in np.flatnonzero(plan.blocking))
         if np.isfinite(plan.shortfall):
             return f"{status.text}. Shortfall {n(plan.shortfall, unit='N')}; {cables}"
@@ -144,30 +114,26 @@ def reason(robot: Robot, pose: Pose, plan: Plan) -> str:
     return status.text
 
 
-def _record(plan: Plan | None) -> Any:
-    from sagline.kinematics.status import PoseStatus
-
+def _record(plan: sl.Plan | None) -> Any:
     if plan is None:
         return None
-    return {"status": PoseStatus(int(plan.status)).name, "chord_tension": list(map(float, plan.chord_tension))}
+    return {"status": sl.PoseStatus(int(plan.status)).name, "chord_tension": list(map(float, plan.chord_tension))}
 
 
-def _rows(robot: Robot, plans: dict[str, Plan | None]) -> list[list[object]]:
+def _rows(robot: sl.Robot, plans: dict[str, sl.Plan | None]) -> list[list[object]]:
     """Status and tensions of each method that is defined for the robot."""
     known = {title: _record(plan) for title, plan in plans.items() if plan is not None}
     head = ["method", "status", *(f"T{k} [N]" for k in range(robot.cable_count))]
     return [head, *([title, each["status"], *each["chord_tension"]] for title, each in known.items())]
 
 
-def _grid(robot: Robot, plans: dict[str, Plan | None]) -> TextTable:
-    from sagline.kinematics.status import PoseStatus
-
+def _grid(robot: sl.Robot, plans: dict[str, sl.Plan | None]) -> TextTable:
     rows = []
     for title, plan in plans.items():
         if plan is not None and plan.feasible:
             rows.append([title, *(f"{value:.1f}" for value in plan.chord_tension), ""])
         else:
-            why = "not defined" if plan is None else PoseStatus(int(plan.status)).name.lower().replace("_", " ")
+            why = "not defined" if plan is None else sl.PoseStatus(int(plan.status)).name.lower().replace("_", " ")
             rows.append([title, *[""] * robot.cable_count, why])
     heads = ["", *map(str, range(robot.cable_count)), ""]
     if not any(row[-1] for row in rows):

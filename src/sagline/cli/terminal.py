@@ -19,8 +19,11 @@ from sagline.core.numbers import SPACE
 from sagline.files.writing import json_text
 
 if TYPE_CHECKING:
-    from sagline.cli.progress import ProgressLine
+    from rich.progress import Progress, Task
 
+    from sagline.core.progress import Progress as ProgressCallback
+
+PATIENCE = 2.0  # time [s] after which the progress line shows a bar and the remaining time
 FREE = 1 << 16  # width of output to a file or a pipe, in characters
 
 _out = Console(highlight=False, markup=False, emoji=False)
@@ -28,11 +31,52 @@ _wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # conso
 _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
+class ProgressLine:
+    """One line that is updated on a terminal; no effect outside a terminal."""
+
+    def __init__(self, bar: Progress, what: str) -> None:
+        """Add the work to a progress bar; the bar is disabled outside a terminal."""
+        self._bar = bar
+        self._task = bar.add_task(printable(what), total=None)
+
+    def stage(self, what: str) -> ProgressCallback:
+        """Begin a new part of the work; returns the function that reports the progress of this part."""
+        self._bar.reset(self._task, total=None, description=printable(what))
+        return self.progress
+
+    def progress(self, done: int, total: int) -> None:
+        """Show the progress of the current part."""
+        self._bar.update(self._task, completed=done, total=total)
+
+    def name(self, what: str) -> None:
+        """Rename the work."""
+        self._bar.update(self._task, description=printable(what))
+
+
 def working(what: str) -> AbstractContextManager[ProgressLine]:
     """Show the work and its progress on a terminal inside the `with` block."""
-    from sagline.cli.progress import progress_line
-
     return progress_line(_err, what)
+
+
+@contextmanager
+def progress_line(console: Console, what: str) -> Iterator[ProgressLine]:
+    """Show a progress line while inside: the name of the work, and the remaining time if the work is long."""
+    from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+    class Late(ProgressColumn):
+        """A column that appears if work of known size takes longer than `PATIENCE`."""
+
+        def __init__(self, column: ProgressColumn) -> None:
+            super().__init__()
+            self._column = column
+
+        def render(self, task: Task) -> RenderableType:
+            return self._column(task) if task.total and (task.elapsed or 0.0) > PATIENCE else Text()
+
+    name = TextColumn("{task.description}", markup=False)
+    columns = (SpinnerColumn(), name, Late(BarColumn()), Late(TimeRemainingColumn()))
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        yield ProgressLine(bar, what)
 
 
 @contextmanager

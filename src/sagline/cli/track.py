@@ -1,65 +1,45 @@
-"""`sagline track`: the plan of a robot along a path."""
+"""`sagline track`: the plan of a robot along a path, its confirmation with exact cables, and its summary."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from textwrap import fill
+from time import perf_counter
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from sagline.cli.options import (
-    USUAL_FORMATS,
-    FiguresOption,
-    FigureStyle,
-    FormatsOption,
-    JsonOption,
-    ModelName,
-    ModelOption,
-    OutOption,
-    PayloadOption,
-    RobotArgument,
-    StyleOption,
-    TableOption,
-    Tension,
-    TensionOption,
-    TensionVariable,
-    VariableOption,
-    WrenchOption,
-    argument,
-)
-from sagline.cli.output import Output
-from sagline.cli.terminal import working
-from sagline.core.errors import FileError
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from sagline.cli.study import ConfirmedRun
-    from sagline.motion.path import Path as MotionPath
-    from sagline.robot.robot import Robot
+import sagline as sl
+from sagline.cli import options as opt
+from sagline.cli.ending import OUTSIDE
+from sagline.cli.output import FigureMaker, Output, TextTable, show_table, values_of
+from sagline.cli.terminal import ProgressLine, show_note, show_text, working
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
+from sagline.files.writing import file_stem
 
 TOO_FAR = 100.0  # largest distance of a path from the robot, divided by the robot's size
 FIGURES = ("path", "velocity", "cables", "error")
 
 
 def track(
-    robot: RobotArgument,
+    robot: opt.RobotArgument,
     path: Annotated[
-        Path | None, argument("PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the article's path.")
+        Path | None,
+        opt.argument("PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the article's path."),
     ] = None,
-    model: ModelOption = ModelName.CATENARY,
-    tension: TensionOption = Tension.CLOSEST,
-    variable: VariableOption = TensionVariable.CHORD,
-    wrench: WrenchOption = None,
-    payload: PayloadOption = None,
-    folder: OutOption = Path("output"),
-    figures: FiguresOption = True,
-    formats: FormatsOption = USUAL_FORMATS,
-    style: StyleOption = FigureStyle.PLAIN,
-    table: TableOption = False,
-    as_json: JsonOption = False,
+    model: opt.ModelOption = opt.ModelName.CATENARY,
+    tension: opt.TensionOption = opt.Tension.CLOSEST,
+    variable: opt.VariableOption = opt.TensionVariable.CHORD,
+    wrench: opt.WrenchOption = None,
+    payload: opt.PayloadOption = None,
+    folder: opt.OutOption = Path("output"),
+    figures: opt.FiguresOption = True,
+    formats: opt.FormatsOption = opt.USUAL_FORMATS,
+    style: opt.StyleOption = opt.FigureStyle.PLAIN,
+    table: opt.TableOption = False,
+    as_json: opt.JsonOption = False,
 ) -> int:
     """Plan the cable lengths of a robot along a path, and confirm them with exact catenaries.
 
@@ -73,13 +53,8 @@ def track(
         sagline track own_robot.yaml own_path.yaml --model empirical --out results
         sagline track cogiro own_samples.csv --payload 20 --csv
     """
-    from sagline.cli.study import run_along, run_name, tell
-    from sagline.cli.values import robot_with_payload
-    from sagline.files.path_file import load_path
-    from sagline.motion.rest_to_rest import article_path
-
-    machine = robot_with_payload(robot, payload)
-    way = article_path() if path is None else load_path(path)
+    machine = opt.robot_with_payload(robot, payload)
+    way = sl.article_path() if path is None else sl.load_path(path)
     if path is not None:
         check_unit(path, way, machine)
     cable = model.build()
@@ -98,7 +73,7 @@ def track(
     return tell([run], output, as_json=as_json)
 
 
-def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
+def check_unit(file: Path, way: sl.Path, robot: sl.Robot) -> None:
     """Raise FileError if a path is so far from the robot that its numbers are probably in another unit."""
     size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
     away = np.linalg.norm(way.pose.position - robot.frame_anchors.mean(axis=0), axis=1)
@@ -107,18 +82,199 @@ def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
         reason = (
             f"leads {away[k]:.4g} m away from {robot.name}, whose frame measures {size:.3g} m, at {way.time[k]:g} s"
         )
-        raise FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
+        raise sl.FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
 
 
-def _figures(run: ConfirmedRun) -> tuple[Callable[[], Figure | Axes], ...]:
+def _figures(run: ConfirmedRun) -> tuple[FigureMaker, ...]:
     """The figures, in the order of FIGURES."""
-    from sagline import plot
-
     way = run.plan.path
     assert way is not None
     return (
-        lambda: plot.path(way),
-        lambda: plot.velocity(way),
-        lambda: plot.overview(run.plan),
-        lambda: plot.error(run.confirmation),
+        lambda: sl.plot.path(way),
+        lambda: sl.plot.velocity(way),
+        lambda: sl.plot.overview(run.plan),
+        lambda: sl.plot.error(run.confirmation),
     )
+
+
+ROWS = {  # rows of a summary: the label and the number format
+    "position_error_max_mm": ("position error, largest [mm]", ".3g"),
+    "position_error_mean_mm": ("position error, mean [mm]", ".3g"),
+    "chord_tension_min_n": ("chord tension, smallest [N]", ".1f"),
+    "chord_tension_max_n": ("chord tension, largest [N]", ".1f"),
+    "unstrained_length_min_m": ("unstrained length, smallest [m]", ".3f"),
+    "unstrained_length_max_m": ("unstrained length, largest [m]", ".3f"),
+    "adjusting_length_min_mm": ("adjusting length, smallest [mm]", ".1f"),
+    "adjusting_length_max_mm": ("adjusting length, largest [mm]", ".1f"),
+    "feasible_share_percent": ("feasible poses [%]", ".4g"),
+    "inverse_us_per_pose": ("inverse kinematics [µs per pose]", ".2f"),
+}
+WIDE, NARROW = 30, 16  # largest widths of the robot and of the tension method in a column's head, in characters
+LONGEST = "unstrained_length_max_m"  # smaller position errors are printed as zero, because lengths have rounding errors
+MOST_GAPS = 5  # largest number of infeasible parts of a path that are printed
+WIDEN = " Move the path, or widen the tension limits."
+SAME_PLACE = (
+    1e-6  # [m], far above the rounding errors of an equilibrium, and far below its distance from a second equilibrium
+)
+
+
+class ConfirmedRun(NamedTuple):
+    """A plan along a path, its confirmation, and the computing time of the inverse kinematics [s]."""
+
+    confirmation: sl.Confirmation
+    seconds: float
+
+    @property
+    def plan(self) -> sl.Plan:
+        """The plan."""
+        return self.confirmation.plan
+
+    @property
+    def name(self) -> str:
+        """Name of the files: robot and model."""
+        return run_name(self.plan.state.one_robot, self.plan.state.cables.model)
+
+    @property
+    def lost(self) -> int:
+        """Number of planned poses without a stable equilibrium of the platform."""
+        stays = self.confirmation.held
+        if isinstance(self.plan.state.cables.model, sl.Catenary):  # exact: a different position is another equilibrium
+            stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
+        return int(np.sum(self.plan.feasible & ~stays))
+
+
+def run_name(robot: sl.Robot, model: sl.CableModel) -> str:
+    """Name of the files of a run, without suffix."""
+    return file_stem(robot.name, type(model).__name__.lower())
+
+
+def run_along(
+    robot: sl.Robot,
+    path: sl.Path,
+    model: sl.CableModel,
+    tension: sl.TensionMethod,
+    line: ProgressLine,
+    wrench: Array | None = None,
+) -> ConfirmedRun:
+    """Plan a path, and confirm the plan with exact cables."""
+    sl.inverse(robot, path.pose[:1], model, tension, wrench)  # load the compiled kernels before the time is measured
+    start = perf_counter()
+    progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
+    plan = sl.inverse(robot, path, model, tension, wrench, progress=progress)
+    seconds = perf_counter() - start
+    return ConfirmedRun(sl.confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
+
+
+def summary(run: ConfirmedRun) -> dict[str, float]:
+    """The numbers of a run's feasible poses, by the keys of ROWS; NaN if no pose is feasible."""
+    plan = run.plan
+    error = 1e3 * np.linalg.norm(run.confirmation.position_error, axis=-1)
+    known = error[~np.isnan(error)]
+    numbers = (
+        *((float(known.max()), float(known.mean())) if known.size else (np.nan, np.nan)),
+        *_range(plan.chord_tension),
+        *_range(plan.unstrained_length),
+        *_range(1e3 * plan.state.cables.adjusting_length),
+        100.0 * float(np.mean(plan.feasible)),
+        1e6 * run.seconds / plan.status.size,
+    )
+    return dict(zip(ROWS, numbers, strict=True))
+
+
+def _gap_text(gap: sl.Gap, plan: sl.Plan) -> str:
+    """Text about an infeasible part of a path: its time, its shortfall and the limiting cables."""
+    assert plan.path is not None
+    first, last = (f"{plan.path.time[k]:g} s" for k in (gap.first, gap.last))
+    when = f"from {first} to {last}" if gap.last > gap.first else f"at {first}"
+    if np.isnan(gap.shortfall):
+        return f"{when}: {gap.status.text}"
+    count = plan.state.one_robot.cable_count
+    cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
+    if np.isinf(gap.shortfall):
+        return f"{when}: no additional force alone is sufficient; limiting: {cables}"
+    short = f"shortfall up to {n(gap.shortfall, '.3g', 'N')}"
+    if gap.hopeless:
+        short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no additional force alone is sufficient"
+    return f"{when}: {short}; limits of {cables}"
+
+
+def tell(runs: Sequence[ConfirmedRun], output: Output, notes: Sequence[str] = (), *, as_json: bool) -> int:
+    """Print the summary, notes and the infeasible parts of the paths; returns the exit code."""
+
+    def show() -> None:
+        show_table(_summary_grid(runs))
+        for note in notes:
+            show_text(note)
+
+    output.report(lambda: {"runs": [_record(run) for run in runs]}, _verdict(runs), show, as_json=as_json)
+    return max((_complaints(run) for run in runs), default=0)
+
+
+def _verdict(runs: Sequence[ConfirmedRun]) -> str:
+    """Sentence with the number of feasible, stable poses of all runs."""
+    poses = sum(run.plan.status.size for run in runs)
+    held = sum(int(np.sum(run.plan.feasible)) - run.lost for run in runs)
+    of = "" if len(runs) == 1 else f" of {len(runs)} runs"
+    if held == poses:
+        return f"All {poses:,} poses{of} are feasible and stable."
+    return f"{held:,} of {poses:,} poses{of} are feasible and stable."
+
+
+def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
+    """Table with one column per run and one row per number."""
+    heads = [""]
+    for run in runs:
+        name = fill(run.plan.state.one_robot.name, WIDE, break_long_words=False, break_on_hyphens=False)
+        how = fill(run.plan.method, NARROW, break_on_hyphens=False)
+        heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}\n{how}")
+    numbers = [summary(run) for run in runs]
+    rows = [
+        [label, *(n(column[field], form, size=1e3 * column[LONGEST]) for column in numbers)]
+        for field, (label, form) in ROWS.items()
+    ]
+    return TextTable(heads, rows)
+
+
+def _complaints(run: ConfirmedRun) -> int:
+    """Print the infeasible parts of the path; returns the exit code of this run."""
+    name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
+    for gap in gaps[:MOST_GAPS]:
+        left = "is unstable" if gap.status is sl.PoseStatus.UNSTABLE else "leaves the feasible region"
+        show_note(f"{name}: ", f"the path {left} {_gap_text(gap, plan)}", style="bold red")
+    if len(gaps) > MOST_GAPS:
+        show_note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} more times", style="bold red")
+    if gaps:
+        limits = all(gap.status is sl.PoseStatus.INFEASIBLE for gap in gaps)
+        show_note("", "The file contains the feasible part and marks the rest." + WIDEN * limits)
+    if run.lost > np.sum(plan.feasible & ~plan.solved):  # the infeasible parts do not include them
+        what = f"{run.lost} of the planned poses are not stable equilibria: the platform would leave its path"
+        show_note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
+    return OUTSIDE if gaps or run.lost else 0
+
+
+def _record(run: ConfirmedRun) -> dict[str, Any]:
+    plan = run.plan
+    clock = plan.path.time if plan.path is not None else None
+    return {
+        "robot": plan.state.one_robot.name,
+        "model": type(plan.state.cables.model).__name__,
+        "tension": type(plan.tension).__name__,
+        "tension_variable": plan.tension.variable,
+        "poses": plan.status.size,
+        **summary(run),
+        "poses_not_stable": run.lost,
+        "gaps": [
+            {
+                "from_s": None if clock is None else clock[gap.first],
+                "to_s": None if clock is None else clock[gap.last],
+                **values_of(gap, "shortfall_n", "cables"),
+                "reason": gap.status.text,
+            }
+            for gap in plan.gaps
+        ],
+    }
+
+
+def _range(values: Array) -> tuple[float, float]:
+    finite = values[~np.isnan(values)]
+    return (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)

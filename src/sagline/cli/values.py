@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import re
 from math import prod
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
+import sagline as sl
+from sagline.cli.options import whole_of as whole_of
 from sagline.core.arrays import FARTHEST, checked
 from sagline.core.errors import InvalidValueError
 from sagline.files.pose_text import pose_of_text as pose_of_text
 from sagline.files.pose_text import wrench_of_text
 from sagline.files.quantity import in_si
-from sagline.robot.pose import Pose, PoseBox
+from sagline.robot.pose import PoseBox
 
-if TYPE_CHECKING:
-    from sagline.robot.robot import Robot
-    from sagline.workspaces.wrench_sets import WrenchSet
-
-LAST_PORT = 65535
 MOST_POSES = 1_000_000  # largest number of poses on a grid
 HEAVIEST = 1e12  # [kg], larger than on any machine, and far below the overflow of numbers
 
@@ -40,18 +37,6 @@ def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: fl
     return float(checked(number, item, unit, shape=(), low=low, above=above))
 
 
-def whole_of(text: str, item: str, least: int, most: int) -> int:
-    """A whole number between `least` and `most`, from a text of digits."""
-    if not re.fullmatch(r"[0-9]{1,20}", text) or not least <= int(text) <= most:
-        raise InvalidValueError(item, repr(text), f"a whole number from {least} to {most}", "Choose another.")
-    return int(text)
-
-
-def port_of(text: str, item: str) -> int:
-    """A TCP port from a text of digits; 0 means any free port."""
-    return whole_of(text, item, 0, LAST_PORT)
-
-
 def ratio(text: str, item: str) -> float:
     """A nonnegative ratio from "0.02" or "2 %"."""
     number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
@@ -66,32 +51,15 @@ def formats_of(text: str, item: str, known: tuple[str, ...]) -> tuple[str, ...]:
     return found
 
 
-def middle_pose(robot: Robot) -> Pose:
-    """Level pose in the middle of a robot's test box. InvalidValueError if the robot has no test box."""
-    if robot.test_box is None:
-        raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot has no test box.")
-    return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
-
-
-def robot_with_payload(name: str, payload: float | None) -> Robot:
-    """The robot of a name or a file, with a payload [kg]; its inertia increases in proportion to its mass."""
-    from sagline.files.robot_file import load_robot
-
-    robot = load_robot(name)
-    return robot if payload is None else robot.with_payload(payload)
-
-
-def wrenches_of(text: str, item: str) -> WrenchSet:
+def wrenches_of(text: str, item: str) -> sl.WrenchSet:
     """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]".
 
     A single force (moment, acceleration) holds for all axes; three numbers hold for x, y and z.
     """
-    from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope
-
     if len(text) > _LONGEST or not _SIGN.match(text):
         if "±" in text or len(text) > _LONGEST:
             raise InvalidValueError(item, repr(text), "all with ±, or all without", _STEP)
-        return WrenchPolytope([cast(Any, wrench_of_text(text, item, _STEP))])
+        return sl.WrenchPolytope([cast(Any, wrench_of_text(text, item, _STEP))])
     found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
     for part in text.split(","):
         kind, size = _load_of(part, item)
@@ -102,9 +70,9 @@ def wrenches_of(text: str, item: str) -> WrenchSet:
             allowed = f"{' or '.join(map(str, most[1:]))} of the unit {_KINDS[kind]}"
             raise InvalidValueError(item, f"{text!r} with {len(sizes)}", allowed, _STEP)
     box = {kind: found[kind] if len(found[kind]) > 1 else sum(found[kind]) for kind in ("force", "moment")}
-    whole: WrenchSet = WrenchBox(box["force"], box["moment"])
+    whole: sl.WrenchSet = sl.WrenchBox(box["force"], box["moment"])
     if found["linear"] or found["angular"]:
-        whole = whole + Accelerations(sum(found["linear"]), sum(found["angular"]))
+        whole = whole + sl.Accelerations(sum(found["linear"]), sum(found["angular"]))
     return whole
 
 

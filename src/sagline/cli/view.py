@@ -1,70 +1,75 @@
-"""`sagline view`: a robot or a run in the browser."""
+"""`sagline view`: a robot or a run in the browser, and the server of the page."""
 
 from __future__ import annotations
 
+import os
 import re
+import signal
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+import webbrowser
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from socket import gethostname
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
-from sagline.cli.options import (
-    HostOption,
-    PayloadOption,
-    PortOption,
-    PoseOption,
-    WrenchOption,
-    argument,
-    converted_option,
-    flag,
-    option,
-    robot_completions,
-)
-from sagline.cli.terminal import show_note, working
-from sagline.core.errors import FileError, InvalidValueError, SaglineError
+import sagline as sl
+from sagline.cli import options as opt
+from sagline.cli.terminal import show_note, show_text, working
 
 if TYPE_CHECKING:
-    from sagline.cli.hosting import ServerAddress
-    from sagline.robot.pose import Pose
-    from sagline.robot.robot import Robot
     from sagline.viewer.page import Page, Source
     from sagline.viewer.player import Beside, Played
     from sagline.viewer.session import LogFollower, PlayedLog
 
 LOG: Final = ".mcap"
 NO_PAGE: Final = "Draw its motion with sagline track, or record a simulation."  # with fewer cables than freedoms
+LATER = "trimesh"  # a package that the viewer imports only when it is needed
 LOOK: Final = 0.5  # time between two checks of a growing file [s]
+
+
+class ServerAddress(NamedTuple):
+    """Address and port of the page (0: any free port); `browser`: open a browser here; `access`: see `start_server`."""
+
+    host: str
+    port: int
+    browser: bool
+    access: Mapping[str, Any] = MappingProxyType({})
 
 
 _RobotOption = Annotated[
     str,
-    argument(
+    opt.argument(
         "ROBOT",
         "A preset (see sagline robots), a robot file, robot.yaml, a log of the controller, run.mcap, or a "
         "calibration, found.nc.",
-        robot_completions,
+        opt.robot_completions,
     ),
 ]
 _RunOption = Annotated[
     Path | None,
-    argument(
+    opt.argument(
         "RUN",
         "A run of this robot by sagline track, a simulation or a log of the controller, which is played; or a "
         "calibration, which is shown.",
     ),
 ]
 _BesideOption = Annotated[
-    Path | None, option("RUN", "Another run of the same robot, shown as a ghost at the same time.")
+    Path | None, opt.option("RUN", "Another run of the same robot, shown as a ghost at the same time.")
 ]
 _TruthOption = Annotated[
     Path | None,
-    option("TWIN.mcap", "For a log of the controller: the log of the twin, which has the true pose of the platform."),
+    opt.option(
+        "TWIN.mcap", "For a log of the controller: the log of the twin, which has the true pose of the platform."
+    ),
 ]
 _AllowHostOption = Annotated[
     list[str] | None,
-    option("NAME", "Further name of this machine, or of a proxy, in the address of a browser. It can be repeated."),
+    opt.option("NAME", "Further name of this machine, or of a proxy, in the address of a browser. It can be repeated."),
 ]
 
 
@@ -72,26 +77,26 @@ def view(
     robot: _RobotOption,
     run: _RunOption = None,
     beside: _BesideOption = None,
-    live: Annotated[bool, flag("Follow a log that is still being written.", "--live")] = False,
+    live: Annotated[bool, opt.flag("Follow a log that is still being written.", "--live")] = False,
     truth: _TruthOption = None,
-    pose: PoseOption = None,
+    pose: opt.PoseOption = None,
     mode: Annotated[
         str | None,
-        option("NUMBER", "Natural mode to animate at the start: 1, 2, ..., or 'massless 1' for massless cables."),
+        opt.option("NUMBER", "Natural mode to animate at the start: 1, 2, ..., or 'massless 1' for massless cables."),
     ] = None,
-    wrench: WrenchOption = None,
-    payload: PayloadOption = None,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = 8080,
+    wrench: opt.WrenchOption = None,
+    payload: opt.PayloadOption = None,
+    host: opt.HostOption = "127.0.0.1",
+    port: opt.PortOption = 8080,
     token: Annotated[
-        bool, flag("Accept only requests with the token in the printed address.", "--token/--no-token")
+        bool, opt.flag("Accept only requests with the token in the printed address.", "--token/--no-token")
     ] = True,
     clients: Annotated[
         int,
-        converted_option("NUMBER", "Largest number of pages open at the same time.", "whole_of", least=1, most=1000),
+        opt.converted("NUMBER", "Largest number of pages open at the same time.", "whole_of", least=1, most=1000),
     ] = 32,
     allow_host: _AllowHostOption = None,
-    browser: Annotated[bool, flag("Open the page in a browser on this machine.", "--browser/--no-browser")] = True,
+    browser: Annotated[bool, opt.flag("Open the page in a browser on this machine.", "--browser/--no-browser")] = True,
 ) -> int:
     """Show a robot in the browser; its platform can be dragged, and the cables follow.
 
@@ -110,72 +115,67 @@ def view(
         sagline view run.mcap --live
         sagline view run.mcap --truth twin.mcap
     """
-    from sagline.cli.hosting import ServerAddress
-    from sagline.cli.values import robot_with_payload
-
     access = {"token": token, "clients": clients, "allow_host": allow_host or ()}
     address = ServerAddress(host, port, browser, access)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
     if log is None and (live or truth is not None):
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
-        raise InvalidValueError(item, "given without a log", "a log in MCAP", step)
+        raise sl.InvalidValueError(item, "given without a log", "a log in MCAP", step)
     found = run if run is not None and _is_calibration(run) else None
     if found is None and Path(robot).suffix.lower() == ".nc":  # not a robot file; the reader reports the error
         found = Path(robot)
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
     given = [item for item, value in alone.items() if value is not None]
     if (run is not None or log is not None or found is not None) and given:
-        raise InvalidValueError(
+        raise sl.InvalidValueError(
             given[0], "given with a run", "a robot alone", "A run has its own values: leave one out."
         )
     if beside is not None and (found is not None or (run is None and log is None)):
         step = "Give both: sagline view cogiro run_a.nc --beside run_b.nc"
-        raise InvalidValueError("--beside", "given without a run", "two runs of one robot", step)
+        raise sl.InvalidValueError("--beside", "given without a run", "two runs of one robot", step)
     if log is not None:
         return view_log(log, robot if log is run else None, address, live=live, truth=truth, beside=beside)
     if found is not None:
         return view_calibration(found, robot if found is run else None, address)
     start = {"pose": pose, "mode": _mode(mode), "wrench": wrench}
-    machine = robot_with_payload(robot, payload)
+    machine = opt.robot_with_payload(robot, payload)
     if run is not None:
         return view_run(machine, run, address, beside)
     return view_robot(machine, robot, address, None if payload is None else machine.mass, **start)
 
 
-def view_robot(robot: Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any) -> int:
+def view_robot(
+    robot: sl.Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any
+) -> int:
     """Serve a robot with a payload [kg] until Ctrl-C; returns the exit code."""
     from sagline.robot.reach import check_cable_count
 
     check_cable_count(robot, step=NO_PAGE)
-    serve, Source = _viewer()
+    Source = _viewer()
     if start.get("mode"):
         _check_mode(robot, **start)
     return serve(robot, address, source=Source.of_robot(name, mass), **start)
 
 
-def view_run(robot: Robot, file: Path, address: ServerAddress, beside: Path | None = None) -> int:
+def view_run(robot: sl.Robot, file: Path, address: ServerAddress, beside: Path | None = None) -> int:
     """Serve a run or a simulation of a robot, optionally with another run, until Ctrl-C; returns the exit code."""
-    from sagline.files.netcdf import is_of
-    from sagline.files.simulation_file import FORMAT
+    Source = _viewer()
     from sagline.robot.reach import check_cable_count
+    from sagline.viewer.playback import PlayedSimulation
 
-    serve, Source = _viewer()
     check_cable_count(robot, step=NO_PAGE)
     played = played_in(robot, file)
     other = None if beside is None else played_beside(played.robot, file, beside)
-    source = Source.of_file("simulation" if is_of(file, FORMAT) else "plan", file)
+    source = Source.of_file("simulation" if isinstance(played, PlayedSimulation) else "plan", file)
     return serve(played.robot, address, played=played, source=source, beside=other)
 
 
 def view_calibration(file: Path, robot: str | None, address: ServerAddress) -> int:
     """Serve a calibrated robot with its calibration until Ctrl-C; returns the exit code."""
-    from sagline.files.calibration_file import load_calibration
-    from sagline.files.robot_file import load_robot
-
-    serve, Source = _viewer()
-    found = load_calibration(file)
+    Source = _viewer()
+    found = sl.load_calibration(file)
     if robot is not None:
-        _check_robot(file, "calibration", found.robot, load_robot(robot))
+        _check_robot(file, "calibration", found.robot, sl.load_robot(robot))
     return serve(found.robot, address, found=found, source=Source.of_file("calibration", file))
 
 
@@ -189,16 +189,14 @@ def view_log(
     beside: Path | None = None,
 ) -> int:
     """Serve a log of the controller until Ctrl-C; `live`: follow a growing log. Returns the exit code."""
-    from sagline.files.robot_file import load_robot
-
-    serve, Source = _viewer()
+    Source = _viewer()
     from sagline.viewer.session import LogFollower
 
     follower = LogFollower(file, truth)
     with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
         session = _first_session(follower, [log for log in (file, truth) if log is not None], live=live)
     if robot is not None:
-        _check_robot(file, "log", session.robot, load_robot(robot), alone=True)
+        _check_robot(file, "log", session.robot, sl.load_robot(robot), alone=True)
     other = None if beside is None else played_beside(session.robot, file, beside)
     if not live and not follower.log.complete:
         show_note("Note: ", f"{file} was cut off: its last second is missing.", style="bold")
@@ -212,11 +210,10 @@ def view_log(
     )
 
 
-def played_in(robot: Robot, file: Path) -> Played:
+def played_in(robot: sl.Robot, file: Path) -> Played:
     """The run, simulation or log of a robot in a file; FileError if the file belongs to another robot."""
     from sagline.files.netcdf import is_of
-    from sagline.files.plan_file import load_plan
-    from sagline.files.simulation_file import FORMAT, load_simulation
+    from sagline.files.simulation_file import FORMAT
     from sagline.viewer.playback import PlayedPlan, PlayedSimulation
     from sagline.viewer.session import LogFollower
 
@@ -225,10 +222,10 @@ def played_in(robot: Robot, file: Path) -> Played:
         _check_robot(file, "log", session.robot, robot)
         return session
     if is_of(file, FORMAT):
-        simulation = load_simulation(file)
+        simulation = sl.load_simulation(file)
         _check_robot(file, "simulation", simulation.robot, robot)
         return PlayedSimulation(simulation)
-    plan = load_plan(file)
+    plan = sl.load_plan(file)
     made_for = plan.state.one_robot
     _check_robot(file, "run", made_for, robot)
     count = len(plan.state.pose) if plan.state.pose.shape else 1
@@ -236,7 +233,7 @@ def played_in(robot: Robot, file: Path) -> Played:
         return PlayedPlan(plan, line.progress)
 
 
-def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
+def played_beside(robot: sl.Robot, first: Path, second: Path) -> Beside:
     """The second run of a robot, which is played together with the first. Both runs have the names of their files."""
     from sagline.viewer.player import Beside
 
@@ -244,11 +241,11 @@ def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
     return Beside(played_in(robot, second), names)
 
 
-def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot, *, alone: bool = False) -> None:
+def _check_robot(file: Path, kind: str, made_for: sl.Robot, robot: sl.Robot, *, alone: bool = False) -> None:
     """Raise FileError if `file` belongs to another robot. Its next step is the command that views `file`."""
     if made_for.name != robot.name:
         step = f"View it as: sagline view {file if alone else f'{made_for.name} {file}'}"
-        raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
+        raise sl.FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
 
 
 def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> PlayedLog:
@@ -260,7 +257,7 @@ def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Pl
     while (session := follower.more()) is None:
         if not live:
             file = follower.log.path
-            raise FileError(file, "has no cycle", "Record at least one cycle.")
+            raise sl.FileError(file, "has no cycle", "Record at least one cycle.")
         time.sleep(LOOK)
     return session
 
@@ -276,7 +273,7 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
                 session = follower.more()
                 if session is not None:
                     viewer.extend(session)
-        except SaglineError as error:
+        except sl.SaglineError as error:
             show_note("Note: ", f"the page no longer follows the log: {error}", style="bold")
 
     thread = threading.Thread(target=look, name="sagline follows", daemon=True)
@@ -288,14 +285,16 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
         thread.join()
 
 
-def _viewer() -> tuple[Callable[..., int], type[Source]]:
-    """The modules of the viewer's server and of its pages; FileError if packages of the viewer are missing."""
-    from sagline.cli import hosting
-
-    hosting.check_viewer()
-    from sagline.viewer.page import Source
-
-    return hosting.serve, Source
+def _viewer() -> type[Source]:
+    """The class that names what a page shows; FileError if a package that the viewer needs is not installed."""
+    try:
+        import sagline.viewer.features  # noqa: F401
+        from sagline.viewer.page import Source
+    except ModuleNotFoundError as error:
+        raise sl.FileError.not_installed(error.name, "The viewer needs it", "viewer") from None
+    if find_spec(LATER) is None:
+        raise sl.FileError.not_installed(LATER, "The viewer needs it", "viewer")
+    return Source
 
 
 def _is_calibration(file: Path) -> bool:
@@ -310,19 +309,58 @@ def _mode(text: str | None) -> str:
     words = " ".join((text or "").split())
     if words and not re.fullmatch(r"(massless )?[1-9][0-9]{0,3}", words):
         step = "The page lists the modes."
-        raise InvalidValueError("--mode", repr(text), "a number from 1 on, or massless 1, massless 2", step)
+        raise sl.InvalidValueError("--mode", repr(text), "a number from 1 on, or massless 1, massless 2", step)
     return words
 
 
-def _check_mode(robot: Robot, pose: Pose | None, mode: str, wrench: Any) -> None:
+def _check_mode(robot: sl.Robot, pose: sl.Pose | None, mode: str, wrench: Any) -> None:
     """Reject `mode` if it is not in the list of modes at `pose`. If there is no list, the page states the reason."""
-    from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
-    from sagline.kinematics.inverse import inverse
     from sagline.robot.reach import home_pose
     from sagline.viewer.features.modes import UP_TO, range_of_modes
     from sagline.viewer.swing import mode_of
 
-    found = vibration(inverse(robot, home_pose(robot) if pose is None else pose, wrench=wrench).state, up_to=UP_TO)
-    if found.status is VibrationStatus.SOLVED and mode_of(found, mode) is None:
+    found = sl.vibration(
+        sl.inverse(robot, home_pose(robot) if pose is None else pose, wrench=wrench).state, up_to=UP_TO
+    )
+    if found.status is sl.VibrationStatus.SOLVED and mode_of(found, mode) is None:
         allowed = f"{range_of_modes(found)}, below {UP_TO:g} Hz"
-        raise InvalidValueError("--mode", repr(mode), allowed, "Choose a mode of the list on the page.")
+        raise sl.InvalidValueError("--mode", repr(mode), allowed, "Choose a mode of the list on the page.")
+
+
+def serve(
+    robot: sl.Robot,
+    address: ServerAddress,
+    *,
+    meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
+    **page: Any,
+) -> int:
+    """Serve a page until Ctrl-C, inside the context `meanwhile`; returns the exit code. `page`: arguments of `Page`."""
+    from sagline.viewer import server as web
+    from sagline.viewer.features import FEATURES
+    from sagline.viewer.page import Page
+
+    server = web.start_server(address.host, address.port, robot.name, **address.access)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C is the normal end of the command from here
+    try:
+        show_text(f"{robot.name} is at {server.url}   (Ctrl-C stops it)", whole=True)
+        if not server.access.local:
+            who = "who has this address" if server.access.path else "who can reach this machine"
+            place = server.url_at(server.access.path, gethostname())
+            text = f"on other machines it is {place}. Everyone {who} can see the page and drag the platform."
+            show_note("Note: ", text, style="bold")
+        viewer = Page(server, FEATURES, robot, **page)
+        if address.browser and _has_display():
+            webbrowser.open(server.url_at(server.access.path_once()))
+        with meanwhile(viewer):
+            viewer.serve()
+    except KeyboardInterrupt:
+        show_note("", "Stopped.")
+    finally:
+        web.stop_server(server)
+    return 0
+
+
+def _has_display() -> bool:
+    """True if a browser can open a window. Over SSH, the browser would open in the terminal."""
+    return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

@@ -15,7 +15,7 @@ import numpy as np
 from sagline.core.arrays import locked
 
 # imported by name at the first display, because a normal import would be circular
-_PAGES = "sagline.notebook.html"
+_PAGES = "sagline.notebook"
 _SUMMARIES = "sagline.present.summaries"
 # imported by name when a result is saved, because the formats import all results
 _FORMATS: Final = "sagline.files.netcdf"

@@ -32,29 +32,18 @@ class Verdict(StrEnum):
 
 
 class Panel(NamedTuple):
-    """Drawing with a caption.
+    """Drawing with a caption."""
 
-    Attributes:
-        svg: The drawing as text.
-        caption: Text of the figure.
-    """
-
-    svg: str
-    caption: str
+    svg: str  # the drawing as text
+    caption: str  # text of the figure
 
 
 class Table(NamedTuple):
-    """Table of texts.
+    """Table of texts."""
 
-    Attributes:
-        caption: Content of the table.
-        head: Column heads with units.
-        rows: The cells; the first cell of a row is the name of the row.
-    """
-
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
+    caption: str  # content of the table
+    head: Sequence[str]  # column heads with units
+    rows: Sequence[Sequence[str]]  # the cells; the first cell of a row is the name of the row
 
 
 def table_of(caption: str, *columns: tuple[str, Iterable[Any], str]) -> Table:
@@ -65,48 +54,28 @@ def table_of(caption: str, *columns: tuple[str, Iterable[Any], str]) -> Table:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """One statement or figure of the article, compared with the computed result.
+    """One statement or figure of the article, compared with the computed result."""
 
-    Attributes:
-        key: HTML id of the finding, and key of its numbers in the results: letters, digits and hyphens.
-        figures: Numbers of the figures of the article that the finding reproduces.
-        tables: Numbers of the tables of the article that the finding reproduces.
-        title: A few words.
-        statement: Statement of the article, with its figure or equation; empty if the article has none.
-        measured: The computed result.
-        verdict: Verdict on the statement.
-        panels: Drawings.
-        data: Tables.
-        numbers: The unformatted numbers of the finding, for the JSON file.
-    """
-
-    key: str
-    title: str
-    statement: str
-    measured: str
-    verdict: Verdict
-    numbers: dict[str, Any]
-    figures: tuple[int, ...] = ()
-    tables: tuple[int, ...] = ()
+    key: str  # HTML id of the finding, and key of its numbers in the results: letters, digits and hyphens
+    title: str  # a few words
+    statement: str  # statement of the article, with its figure or equation; empty if the article has none
+    measured: str  # the computed result
+    verdict: Verdict  # verdict on the statement
+    numbers: dict[str, Any]  # the unformatted numbers of the finding, for the JSON file
+    figures: tuple[int, ...] = ()  # numbers of the figures of the article that the finding reproduces
+    tables: tuple[int, ...] = ()  # numbers of the tables of the article that the finding reproduces
     panels: tuple[Panel, ...] = ()
     data: tuple[Table, ...] = field(default=())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chapter:
-    """Chapter of the report.
+    """Chapter of the report."""
 
-    Attributes:
-        key: Name of the chapter.
-        title: Heading of the chapter.
-        lead: Introduction of the chapter.
-        findings: Findings of the chapter.
-    """
-
-    key: str
-    title: str
-    lead: str
-    findings: tuple[Finding, ...]
+    key: str  # name of the chapter
+    title: str  # heading of the chapter
+    lead: str  # introduction of the chapter
+    findings: tuple[Finding, ...]  # findings of the chapter
 
 
 MANY = {  # texts of the verdicts for several statements

@@ -42,37 +42,22 @@ LAST = 1.0  # length of the interval at the end of a simulation that shows the r
 
 
 class Row(NamedTuple):
-    """Value of a summary.
+    """Value of a summary."""
 
-    Attributes:
-        key: Name in JSON, with the unit.
-        label: Label for readers.
-        value: Value in JSON.
-        text: Text of the value with the unit, for readers; "" for a value that is only for programs.
-    """
-
-    key: str
-    label: str
-    value: Any
-    text: str
+    key: str  # name in JSON, with the unit
+    label: str  # label for readers
+    value: Any  # value in JSON
+    text: str  # text of the value with the unit, for readers; "" for a value that is only for programs
 
 
 class Summary(NamedTuple):
-    """Summary of a robot, a path, a plan or a result.
+    """Summary of a robot, a path, a plan or a result."""
 
-    Attributes:
-        title: Type and name of the object.
-        verdict: Verdict in one line.
-        good: True for a good verdict, False for a bad verdict, None for a neutral verdict.
-        notes: Further lines.
-        rows: Values.
-    """
-
-    title: str
-    verdict: str
-    good: bool | None
-    notes: tuple[str, ...] = ()
-    rows: tuple[Row, ...] = ()
+    title: str  # type and name of the object
+    verdict: str  # verdict in one line
+    good: bool | None  # True for a good verdict, False for a bad verdict, None for a neutral verdict
+    notes: tuple[str, ...] = ()  # further lines
+    rows: tuple[Row, ...] = ()  # values
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,6 @@ if TYPE_CHECKING:
 MOST_RATE: Final = 100.0  # samples per second of a screen; a run with at least twice as many loses samples
 
 
-class _SampleVerdict(NamedTuple):
-    """Verdict on a sample."""
-
-    good: bool | None  # None if unknown
-    words: str
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedMotion:
     """N samples of the motion of a robot."""
@@ -48,7 +41,7 @@ class SharedMotion:
     chord_tension: Array  # chord tensions of the drawn catenaries [N], shape (N, m); NaN for a straight line
     length: Array  # unstrained length off the drum [m], shape (N, m)
     verdict: NDArray[np.intp]  # indices of `verdicts`, shape (N,)
-    verdicts: tuple[_SampleVerdict, ...]
+    verdicts: tuple[tuple[bool | None, str], ...]  # True for a good sample, None if unknown; verdict in words
     notes: tuple[str, ...] = ()
 
     def pose_at(self, index: int) -> Pose | None:
@@ -76,11 +69,11 @@ def of_plan(plan: Plan) -> SharedMotion:
     """Samples of a plan of N poses. Poses without times get intervals of one second."""
     count = len(plan.state.pose)
     time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
-    verdicts = [_SampleVerdict(True, "Feasible")]
+    verdicts: list[tuple[bool | None, str]] = [(True, "Feasible")]
     which = np.zeros(count, dtype=np.intp)
     for gap in plan.gaps:
         which[gap.first : gap.last + 1] = len(verdicts)
-        verdicts.append(_SampleVerdict(False, _why(gap)))
+        verdicts.append((False, _why(gap)))
     notes = ["The poses have no times; the page shows one per second."] * (plan.path is None)
     if not isinstance(plan.state.cables.model, Catenary):
         name = type(plan.state.cables.model).__name__.lower()
@@ -109,12 +102,12 @@ def of_simulation(simulation: Simulation) -> SharedMotion:
     """Samples of a simulation. Cables with mass are drawn as catenaries at rest with the same lengths."""
     robot, time = simulation.robot, simulation.time
     broken = np.zeros_like(simulation.tensions, dtype=bool)
-    verdicts = [_SampleVerdict(None, "Simulated")]
+    verdicts: list[tuple[bool | None, str]] = [(None, "Simulated")]
     which = np.zeros(len(time), dtype=np.intp)
     for event in simulation.events:
         of = "" if event.cable is None else f" of cable {event.cable}"
         which[time >= event.time] = len(verdicts)
-        verdicts.append(_SampleVerdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
+        verdicts.append((None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
         if event.kind == "break" and event.cable is not None:
             broken[time >= event.time, event.cable] = True
     tension = np.where(broken, np.nan, simulation.tensions)
@@ -152,7 +145,7 @@ def of_session(session: PlayedLog) -> SharedMotion:
     quaternion = np.where(planned, session.planned_quaternion, session.quaternion[row])
     codes, which = np.unique(session.state, return_inverse=True)
     states = [State(int(code)) for code in codes]
-    verdicts = tuple(_SampleVerdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
+    verdicts = tuple((False if state in WRONG else None, f"Controller: {state.name}") for state in states)
     unknown = ~np.isfinite(position).all(axis=1)
     if unknown.any():  # no earlier pose is known
         somewhere = session.pose_at(int(np.argmax(unknown)))

@@ -21,8 +21,7 @@ from sagline.robot.batch import has_routing, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
-from sagline.share.calls import AnyArray, Call, described_calls
-from sagline.share.packing import PackedColumn, encode_columns
+from sagline.share.packing import AnyArray, Call, PackedColumn, described_calls, encode_columns
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import DEFAULT

@@ -16,10 +16,9 @@ from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
-from sagline.share.calls import module_text
 from sagline.share.course import SharedMotion
 from sagline.share.machine import colors, drawing_data, json_numbers, model_data, robot_drawing, solids_data
-from sagline.share.packing import PackedColumn, encode_columns
+from sagline.share.packing import PackedColumn, encode_columns, module_text
 from sagline.viewer.shapes import round_below, size_of
 from sagline.viewer.tension_scale import number_text
 
@@ -79,7 +78,7 @@ def course_page(course: SharedMotion, title: str) -> str:
     facts = {
         **_facts(robot, drawing_data(robot)),
         "states": header,
-        "verdicts": [each._asdict() for each in kept.verdicts],
+        "verdicts": [{"good": good, "words": words} for good, words in kept.verdicts],
     }
     about = f"{robot.name}, {kept.kind} of {kept.time[-1]:.4g} s"
     return _filled(

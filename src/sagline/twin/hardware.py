@@ -10,8 +10,8 @@ import numpy as np
 from sagline.control.link import HEARTBEAT
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
+from sagline.dynamics.simulation.simulate import frequency_with_winches, platform_frequency
 from sagline.dynamics.simulation.simulator import Reading, Simulator
-from sagline.dynamics.simulation.steps import frequency_with_winches, platform_frequency
 from sagline.dynamics.simulation.winches import drive_data
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.cable.drum import lengths_of_turns, turns_of_lengths

@@ -11,7 +11,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.simulation.chains_at_rest import chains_at_rest
+from sagline.dynamics.simulation.chain_plant import chains_at_rest
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
@@ -45,9 +45,9 @@ def test_chains_converge_to_the_exact_equilibrium_with_second_order(name: str) -
     state = preset_at_rest(name, *np.mean([box.low, box.high], axis=0) + 0.1)
     off = []
     for nodes in (10, 20, 40):
-        found = chains_at_rest(state, nodes)
-        tension = np.linalg.norm(found.force, axis=1) - state.cables.platform_end_tension
-        off.append([np.linalg.norm(found.pose.position - state.pose.position), np.abs(tension).max()])
+        pose, _, force = chains_at_rest(state, nodes)
+        tension = np.linalg.norm(force, axis=1) - state.cables.platform_end_tension
+        off.append([np.linalg.norm(pose.position - state.pose.position), np.abs(tension).max()])
     assert np.divide(off[0], off[1]) == pytest.approx(4.0, abs=0.02)
     assert np.divide(off[1], off[2]) == pytest.approx(4.0, abs=0.01)
 
@@ -81,9 +81,9 @@ def test_nodes_converge_to_the_exact_catenary_with_second_order() -> None:
     start = sl.forward(robot, [5.5, 5.5], start=sl.Pose([0.0, 0.0, 3.0], np.eye(3))).state
     off = []
     for nodes in (10, 20):
-        found = chains_at_rest(start, nodes)
+        _, place, _ = chains_at_rest(start, nodes)
         exact = start.cables.points(nodes + 1)[1]
-        below = found.place[1, 2, ::-1] - start.exit_point[1, 2]
+        below = place[1, 2, ::-1] - start.exit_point[1, 2]
         off.append(np.abs(below - exact[:, 1]).max())
     assert off[0] < 0.02
     assert off[0] / off[1] == pytest.approx(4.0, abs=0.1)
@@ -357,7 +357,7 @@ def test_a_pendulum_of_chains_rests_at_its_exact_stretch(lever: float) -> None:
 @pytest.mark.parametrize("frame", [[(-4, 0, 7.0), (4, 0, 8.0)], [(-4, 0, 7.0), (4, 0, 8.0), (0, 4, 8.0)]])
 def test_chains_to_a_common_point_reach_the_exact_equilibrium(frame: Any) -> None:
     state = on_a_point(*frame, lengths=[6.0, 8.0, 7.0][: len(frame)])
-    off = [np.linalg.norm(chains_at_rest(state, nodes).pose.position - state.pose.position) for nodes in (10, 20, 40)]
+    off = [np.linalg.norm(chains_at_rest(state, nodes)[0].position - state.pose.position) for nodes in (10, 20, 40)]
     assert np.divide(off[:-1], off[1:]) == pytest.approx(4.0, abs=0.05)
     run = sl.simulate(state, duration=0.1, cable_mass="lumped", nodes=10)
     assert np.ptp(run.pose.position, axis=0).max() < 1e-12

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,27 +29,14 @@ SHORTER: Final = "Simulate a shorter time, or record less often."
 SMALL: Final = 0.02  # largest change of a cable length, as a share of the length
 
 
-class _ModalModel(NamedTuple):
-    """Response of the modes of a state to changes u = (dL, dw) of lengths and wrench, (m + 6,)."""
+def modal_model(state: Equilibrium, damping: Damping) -> tuple[Vibration, Array, Array, Array, Array]:
+    """Modes of `state`, and their response to changes u = (dL, dw) of lengths and wrench, shape (m + 6,).
 
-    found: Vibration  # the modes
-    drive: Array  # modal force per unit of u, (K, m + 6)
-    motion: Array  # static platform motion due to u minus the static response of the modes, (6, m + 6)
-    pulled: Array  # frame-end tensions per modal amplitude, (m, K) [N/(m sqrt(kg))]
-    tension: Array  # static tensions due to u minus the static response of the modes, (m, m + 6)
-
-
-class _ModalMotion(NamedTuple):
-    """Amplitudes and rates of the modes at N instants, (N, K), with work and lost energy since the start, (N,)."""
-
-    amplitude: Array
-    rate: Array
-    supplied: Array
-    lost: Array
-
-
-def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
-    """Compute the modal model of `state`."""
+    Returns:
+        Modes; modal force per unit of u, (K, m + 6); static platform motion due to u minus the static response of the
+        modes, (6, m + 6); frame-end tensions per modal amplitude, (m, K) [N/(m sqrt(kg))]; static tensions due to u
+        minus the static response of the modes, (m, m + 6).
+    """
     # source: docs/model.md, section 11
     found = vibration(state, up_to=UP_TO * float(np.nanmax(modes(state).frequency)), damping=damping)
     if found.status is not VibrationStatus.SOLVED:
@@ -69,7 +56,7 @@ def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
     whole = np.concatenate((rest.length_sensitivity, rest.compliance), axis=1)
     tension = np.concatenate((rest.tension_sensitivity, by_wrench), axis=1)
     slow = drive / square[:, None]
-    return _ModalModel(found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow)
+    return found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow
 
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
@@ -95,9 +82,9 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
     return force
 
 
-def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> _ModalMotion:
-    """Exact response of modes at rest to piecewise linear forces."""
-    # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]
+def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> tuple[Array, Array, Array, Array]:
+    """Exact response of modes at rest to piecewise linear forces: amplitudes, rates, work and lost energy."""
+    # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]; returns (N, K) twice, then (N,) twice
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
     root = -ratio * frequency + 1j * ringing
     whole = np.exp(root * step)
@@ -119,15 +106,15 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
     taken = 0.5 * step * (power[1:] + power[:-1]) - step * step / 12.0 * np.diff(bend, axis=0)
     start = np.zeros(1)
     supplied = np.concatenate((start, np.cumsum(work.sum(axis=1))))
-    return _ModalMotion(amplitude, rate, supplied, np.concatenate((start, np.cumsum(taken.sum(axis=1)))))
+    return amplitude, rate, supplied, np.concatenate((start, np.cumsum(taken.sum(axis=1))))
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
     """Simulate the small motion of a robot about its initial equilibrium; `step` and `record` in s."""
     state = given.state
     _check(given)
-    model = modal_model(state, damping)
-    found, frequency = model.found, 2.0 * np.pi * model.found.frequency
+    found, drive, static_motion, pulled, static_tension = modal_model(state, damping)
+    frequency = 2.0 * np.pi * found.frequency
     if (found.loss >= 1.0).any():
         k = int(np.argmax(found.loss >= 1.0))
         value = f"a ratio of {found.loss[k]:.3g} at {found.frequency[k]:.3g} Hz with cable mass"
@@ -146,14 +133,13 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
     lengths, wrenches = given.lengths.at(time)[0], given.wrench.at(time)[0]
     change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
     _check_small_changes(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
-    response = modal_response(frequency, found.loss, change @ model.drive.T, size)
-    amplitude, rate, driven = response.amplitude[kept], response.rate[kept], change[kept]
-    motion = amplitude @ found.shape.T + driven @ model.motion.T
+    response = modal_response(frequency, found.loss, change @ drive.T, size)
+    at_steps = state.cables.frame_end_tension + response[0] @ pulled.T + change @ static_tension.T
+    (amplitude, rate, supplied, lost), driven = (part[kept] for part in response), change[kept]
+    motion = amplitude @ found.shape.T + driven @ static_motion.T
     kinetic, potential = 0.5 * (rate**2).sum(axis=1), 0.5 * ((amplitude * frequency) ** 2).sum(axis=1)
-    supplied, lost = response.supplied[kept], response.lost[kept]
-    at_steps = state.cables.frame_end_tension + response.amplitude @ model.pulled.T + change @ model.tension.T
     slopes = np.gradient(driven, time[kept], axis=0)
-    moving, pose = rate @ found.shape.T + slopes @ model.motion.T, displaced_pose(state.pose, given.robot, motion)
+    moving, pose = rate @ found.shape.T + slopes @ static_motion.T, displaced_pose(state.pose, given.robot, motion)
     return Simulation(
         robot=given.robot,
         time=locked(time[kept].copy()),

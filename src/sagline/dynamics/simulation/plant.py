@@ -30,80 +30,58 @@ NOTES: Final = 1000  # number of recorded unscheduled events after which a run p
 
 
 class Records:
-    """Records of N steps, which the kernel fills.
+    """Records of N steps, which the kernel fills."""
 
-    Attributes:
-        states: Center of mass, quaternion of the principal axes, velocity and angular velocity, (N, 13).
-        tensions: Tensions at the frame ends [N], (N, m).
-        lengths: Unstrained lengths [m], (N, m).
-        energies: Kinetic, potential, supplied and lost energy [J], (N, 4).
-        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS). After NOTES events, a run
-            pauses to store them.
-        points: Points of cables with mass [m], (N, m, points, 3); None without cable mass.
-    """
-
-    def __init__(self, count: int, cables: int) -> None:
-        """Allocate records for a number of steps."""
-        self.states = np.empty((count, body.STATE_COLUMNS))
-        self.tensions = np.empty((count, cables))
-        self.lengths = np.empty((count, cables))
-        self.energies = np.empty((count, k.ENERGY_COLUMNS))
+    def __init__(self, count: int, cables: int, points: int = 0) -> None:
+        """Allocate records for `count` steps; `points` per cable with mass."""
+        self.states = np.empty((count, body.STATE_COLUMNS))  # center of mass, principal axes, velocities: `rigid_body`
+        self.tensions = np.empty((count, cables))  # tensions at the frame ends [N]
+        self.lengths = np.empty((count, cables))  # unstrained lengths [m]
+        self.energies = np.empty((count, k.ENERGY_COLUMNS))  # kinetic, potential, supplied and lost energy [J]
+        # events, see `sagline.kernels.dynamics.progress`; after NOTES events, a run pauses to store them
         self.notes = np.zeros((NOTES + 2 * cables, k.NOTE_COLUMNS))
-        self.points: Array | None = None
+        # points of cables with mass [m]; None without cable mass
+        self.points = np.full((count, cables, points, 3), np.nan) if points else None
 
     @property
     def arrays(self) -> tuple[Array, ...]:
         """Return the arrays for the kernel."""
-        return self.states, self.tensions, self.lengths, self.energies, self.notes
+        given = self.states, self.tensions, self.lengths, self.energies, self.notes
+        return given if self.points is None else (*given, self.points)
 
 
 class Plant:
     """Mutable state of a robot during a simulation.
 
     In this class the platform axes are the principal axes of the platform, with the origin at the center of mass.
-
-    Attributes:
-        robot: The robot at the start.
-        model: Cable model.
-        axes: Principal axes in the platform frame, one per column, (3, 3).
-        turn: Quaternion from principal axes to the platform frame, (4,).
-        turn_back: The inverse quaternion, (4,).
-        inertia: Mass and principal moments, (4,).
-        cables: Indices of the unbroken cables, (m,).
-        state: State row as in `sagline.kernels.dynamics.rigid_body`, (13,).
-        rows: Rows of the cables, (CABLE_ROWS, m).
-        now: State of the drives, (DRIVE_ROWS, m).
-        data: Parameters of the drives, (DATA_ROWS, m).
-        audit: Sums over the run, (AUDIT_SIZE,).
-        counters: Counters of the kernel, see `sagline.kernels.dynamics.progress`, (COUNTERS,).
-        layers: Strain of the cable on the drums, (m, B).
-        kernel: Integrator; its arguments are `arguments`, arrays of records, number of steps, and steps per record.
-        cable_mass: Cable mass option of `simulate`.
     """
 
+    # integrator; its arguments are `arguments`, arrays of records, number of steps, and steps per record
     kernel: ClassVar[Any] = staticmethod(motion.run_massless)
-    cable_mass: ClassVar[str] = "none"
+    cable_mass: ClassVar[str] = "none"  # option of `simulate`
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
         """Create the state of `robot` at `pose`; `twist` (6,); `length` (m,) [m]; `data` (DATA_ROWS, m)."""
         m = robot.cable_count
-        self.robot, self.model, self.data = robot, model, data
-        moments, self.axes = _principal_axes(robot, pose)
-        self.turn = Rotation.from_matrix(self.axes).as_quat()
-        self.turn_back = locked(self.turn * [-1.0, -1.0, -1.0, 1.0])
+        self.robot, self.model, self.data = robot, model, data  # the robot at the start
+        moments, self.axes = _principal_axes(robot, pose)  # principal axes in the platform frame, one per column
+        self.turn = Rotation.from_matrix(self.axes).as_quat()  # rotation from principal axes to the platform frame
+        self.turn_back = locked(self.turn * [-1.0, -1.0, -1.0, 1.0])  # inverse rotation
         self.inertia = np.array([robot.mass, *moments])
-        self.cables: Indices = np.arange(m)
+        self.cables: Indices = np.arange(m)  # indices of the unbroken cables
         self._table = cable_table(robot)[0].copy()
         anchors = slice(tables.PLATFORM_X, tables.PLATFORM_Z + 1)
         self._table[:, anchors] = (robot.platform_anchors - robot.center_of_mass) @ self.axes
+        self.points = 0  # recorded points per cable with mass
         self._behind = has_routing(robot) or None
-        self.state = self._state_at(pose, twist)
-        self.rows = np.full((CABLE_ROWS, m), np.nan)
+        self.state = self._state_at(pose, twist)  # row as in `sagline.kernels.dynamics.rigid_body`
+        self.rows = np.full((CABLE_ROWS, m), np.nan)  # rows of the cables
         self.rows[LENGTH_ROW] = length
-        self.now = np.zeros((d.DRIVE_ROWS, m))
+        self.now = np.zeros((d.DRIVE_ROWS, m))  # state of the drives
         self.now[d.WOUND] = length * (1.0 + data[d.WINDING_STRAIN])
         self.now[d.STORED] = data[d.WINDING_STRAIN]
-        self.layers = np.zeros((m, 1))
+        self.layers = np.zeros((m, 1))  # strain of the cable on the drums
+        # sums over the run; counters of the kernel, see `sagline.kernels.dynamics.progress`
         self.audit, self.counters = np.zeros(d.AUDIT_SIZE), np.zeros(k.COUNTERS, dtype=np.int64)
         self._work = np.zeros(0)
 
@@ -129,8 +107,8 @@ class Plant:
         return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept
 
     def records(self, count: int) -> Records:
-        """Allocate records for a number of steps."""
-        return Records(count, len(self.cables))
+        """Allocate records for `count` steps."""
+        return Records(count, len(self.cables), self.points)
 
     def platform_states(self, states: Array) -> Array:
         """Convert recorded states of the simulated body to states of the platform, (N, 13)."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
 from sagline.core.arguments import choice, optional
-from sagline.core.arrays import number
+from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.dynamics.simulation.chain_plant import ChainPlant, check_lumped, checked_nodes, wave_frequency
@@ -23,14 +24,13 @@ from sagline.dynamics.simulation.modal import check_modal_arguments, modal_simul
 from sagline.dynamics.simulation.plant import Plant
 from sagline.dynamics.simulation.results import Drop, Event, PickUp, Simulation, checked_events
 from sagline.dynamics.simulation.run import SimulationRun
-from sagline.dynamics.simulation.steps import checked_step, frequency_with_winches, platform_frequency
 from sagline.dynamics.simulation.winches import Winches, Winding, checked_winding, drive_data, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import massless as k
 from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium, HasState
-from sagline.robot.pose import PoseLike
+from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
 
 Integrator = Literal["splitting", "runge-kutta"]  # in the order of the integrator codes of the kernel
@@ -172,25 +172,18 @@ def started_run(
     """Prepare a simulation at its first step."""
     if elements:
         check_lumped(given)
-    kind, losses = winch_kind(winches), checked_damping(damping)
-    code = integrator_code(integrator, kind, elements)
-    winding = checked_winding(winding, kind)
     air = TimeTable.constant(np.zeros(3)) if wind is None else checked_time_table(wind, "wind", "m/s", 3, given.begin)
     happening = checked_events(events, given.robot, given.begin, given.end)
-    plant = initial_plant(given, winches, wind is not None, elements, losses)
-    if winding == "remembered" and kind == d.DRUMS:
-        plant.remember_winding(float(given.lengths.value.max()))
-    waves = wave_frequency(given, elements) if elements else 0.0
-    size = time_step(given, plant, step, code, kind, losses, happening, waves)
-    work, every, count = load_bits(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
+    plant, rules, size, losses = initial_plant(
+        given, elements, step, integrator, winches, winding, damping, happening, with_wind=wind is not None
+    )
+    every, count = _every(record, size), _count(given, size)
     numbers_each = 19 + given.robot.cable_count * (2 + (3 * elements + 3 if elements else 0))
     check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
-    rules = (code, kind, int(winding == "remembered"), work, round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
-    settings = {"integrator": get_args(Integrator)[code], "winches": winches, "winding": winding, "damping": losses}
-    return SimulationRun(
-        plant, rules, numbers, (_set_points(given, plant, kind), given.wrench, air), every, count, happening, settings
-    )
+    settings = {"integrator": get_args(Integrator)[rules[0]], "winches": winches, "winding": winding, "damping": losses}
+    inputs = (_set_points(given, plant, rules[1]), given.wrench, air)
+    return SimulationRun(plant, rules, numbers, inputs, every, count, happening, settings)
 
 
 def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
@@ -203,22 +196,42 @@ def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
 
 
 def initial_plant(
-    given: InitialConditions, winches: Winches, with_wind: bool, elements: int = 0, losses: Damping | None = None
-) -> Plant:
-    """Create the plant for the start of the run, with winches at their initial speeds."""
+    given: InitialConditions,
+    elements: int,
+    step: float | None,
+    integrator: Integrator | None,
+    winches: Winches,
+    winding: Winding,
+    damping: Damping | None,
+    events: tuple[Event, ...] = (),
+    *,
+    with_wind: bool = False,
+    spare: float = 1.0,
+) -> tuple[Plant, tuple[int, int, int, int, int], float, Damping]:
+    """Check the options, and create the plant at its first step, with winches at their initial speeds.
+
+    `spare`: factor of the lengths up to which drums remember their winding. Returns the plant, the rules of the kernel
+    (codes of integrator and winches, remembered winding, loads, steps per period), the time step [s] and the losses.
+    """
+    kind, losses = winch_kind(winches), _checked_damping(damping)
+    code, remembered = _integrator_code(integrator, kind, elements), checked_winding(winding, kind) == "remembered"
     length = given.state.unstrained_length
     data = drive_data(given.robot, winches, length, with_wind)
     if elements:
-        plant: Plant = ChainPlant(given, data, elements, losses or Damping())
+        plant: Plant = ChainPlant(given, data, elements, losses)
     else:
         plant = Plant(given.robot, given.model, given.state.pose, given.twist, length, data)
     plant.audit[d.BEGIN] = given.begin
     plant.now[d.RATE] = given.rate
     plant.now[d.SPEED] = given.rate * (1.0 + data[d.WINDING_STRAIN])
-    return plant
+    if remembered:
+        plant.remember_winding(spare * float(given.lengths.value.max()))
+    size = _time_step(given, data, step, code, kind, losses, events, elements)
+    stride = round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1
+    return plant, (code, kind, int(remembered), _load_bits(losses, given.wrench, with_wind), stride), size, losses
 
 
-def checked_damping(damping: Damping | None) -> Damping:
+def _checked_damping(damping: Damping | None) -> Damping:
     """The checked damping of a simulation. None gives no damping."""
     found = optional(damping, Damping, "damping") or Damping()
     if found.modal_damping > 0.0:
@@ -227,7 +240,7 @@ def checked_damping(damping: Damping | None) -> Damping:
     return found
 
 
-def integrator_code(integrator: Any, kind: int, elements: int = 0) -> int:
+def _integrator_code(integrator: Any, kind: int, elements: int) -> int:
     """The kernel's code of an integrator."""
     if integrator is not None:
         choice(integrator, "integrator", get_args(Integrator))
@@ -240,24 +253,16 @@ def integrator_code(integrator: Any, kind: int, elements: int = 0) -> int:
     return k.SPLITTING if kind == d.DRUMS or elements or integrator == "splitting" else k.RUNGE_KUTTA
 
 
-def time_step(
-    given: InitialConditions,
-    plant: Plant,
-    step: Any,
-    code: int,
-    kind: int,
-    losses: Damping,
-    events: Any,
-    waves: float = 0.0,
+def _time_step(
+    given: InitialConditions, data: Array, step: Any, code: int, kind: int, losses: Damping, events: Any, elements: int
 ) -> float:
-    """Check `step` [s] for the smallest platform mass of the run; `waves`: highest angular frequency of cables [rad/s].
-
-    Losses limit the step only for massless cables. For cables with mass, losses are integrated implicitly.
-    """
+    """Check `step` [s] for the smallest platform mass of the run; `data`: drives; `elements`: per cable with mass."""
     robot, lengths = given.robot, given.lengths.value
+    waves = wave_frequency(given, elements) if elements else 0.0
     platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
-    highest = frequency_with_winches(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
-    return checked_step(step, code, highest, losses if waves == 0.0 else Damping(), kind == d.DRUMS, waves)
+    highest = frequency_with_winches(platform, kind, data, lengths, robot.cables.axial_stiffness)
+    # losses limit the step only for massless cables; for cables with mass, they are integrated implicitly
+    return checked_step(step, code, highest, Damping() if elements else losses, kind == d.DRUMS, waves)
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:
@@ -269,7 +274,7 @@ def _lightness(mass: float, events: tuple[Event, ...]) -> float:
     return float(np.sqrt(mass / least))
 
 
-def load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
+def _load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
     """Bit mask for the kernel: one bit for each active damping or load."""
     damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
     loaded = with_wind or bool(wrench.value.any())
@@ -291,3 +296,74 @@ def _count(given: InitialConditions, step: float) -> int:
         longest, advice = f"<= {MOST_STEPS * step:g} s, {MOST_STEPS:.0e} steps", "Simulate a shorter time."
         raise InvalidValueError("duration", f"{given.end - given.begin:g} s", longest, advice)
     return int(count)
+
+
+LIMIT: Final = {k.SPLITTING: 2.0, k.RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # largest stable step times highest frequency
+SHARE: Final = 0.2  # default product of step and highest angular frequency [rad]
+# default step divided by the limit 0.4 l sqrt(rho/EA) of chains; small, because a break excites the shortest waves
+WAVE_SHARE: Final = 0.465
+LONGEST: Final = 1e-3  # s
+
+
+def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
+    """Highest angular frequency of the platform with all cables taut [rad/s]. Sag reduces this frequency."""
+    # shapes: lengths (K, m) [m]
+    rotation, freedom = poses.matrix, robot.freedom
+    levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
+    ends = (poses.position + rotation @ robot.center_of_mass)[:, None] + levers
+    chords = ends - robot.frame_anchors
+    distance = np.linalg.norm(chords, axis=-1, keepdims=True)
+    along = chords / np.maximum(distance, 1e-300)
+    rows = np.concatenate((along, np.cross(levers, along)), axis=-1) @ freedom.T
+    taut = np.maximum(distance[..., 0], 1e-300)
+    with np.errstate(over="ignore", invalid="ignore"):  # lengths that are too short are refused below
+        springs = robot.cables.axial_stiffness / (np.minimum(lengths.min(axis=0), taut) if len(poses) == 1 else taut)
+        stiffness = np.swapaxes(rows, 1, 2) @ (springs[..., None] * rows)
+    if not np.isfinite(stiffness).all():
+        value = f"down to {lengths.min():g} m"
+        raise InvalidValueError("unstrained_length", value, "longer cables", "Correct unstrained_length.")
+    mass = np.zeros((len(poses), 6, 6))
+    mass[:, :3, :3] = robot.mass * np.eye(3)
+    mass[:, 3:, 3:] = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
+    squares = np.linalg.eigvals(np.linalg.solve(freedom @ mass @ freedom.T, stiffness)).real
+    return float(np.sqrt(max(squares.max(), 0.0)))
+
+
+def checked_step(
+    step: float | None, integrator: int, highest: float, damping: Damping, stride: bool, waves: float = 0.0
+) -> float:
+    """Check the time step `step` [s] of a run. `highest` and `waves` are angular frequencies [rad/s]."""
+    limit = _limit(integrator, max(highest, waves), damping)
+    if step is None:
+        usual = min(SHARE / LIMIT[integrator] * _limit(integrator, highest, damping), LONGEST)
+        usual = min(usual, WAVE_SHARE * limit) if waves > 0.0 else usual
+        return LONGEST / math.ceil(LONGEST / usual - 1e-9)
+    given = number(step, "step", "s", above=0.0)
+    if given > limit:
+        what = "cables with mass" if waves > highest else "massless cables taut"
+        at = f"{max(highest, waves) / (2.0 * math.pi):.3g} Hz, {what}"
+        allowed = f"<= {limit:.3g} s, the limit of stability at {at}"
+        raise InvalidValueError("step", f"{given:g} s", allowed, "Omit step, or give a tenth of the limit.")
+    parts = LONGEST / given
+    if stride and (parts < 0.5 or abs(parts - round(parts)) > 1e-9 * parts):
+        step_to = "Give for instance 1e-3 or 5e-4, because drives close their loops every millisecond."
+        raise InvalidValueError("step", f"{given:g} s", "0.001 s divided by a whole number", step_to)
+    return LONGEST / round(parts) if stride else given
+
+
+def _limit(integrator: int, highest: float, damping: Damping) -> float:
+    """Longest stable step [s] at the angular frequency `highest`."""
+    ratio = 0.5 * damping.loss_time * highest  # damping ratio at the highest frequency
+    slower = math.sqrt(1.0 + ratio * ratio) - ratio
+    return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
+
+
+def frequency_with_winches(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
+    """Highest angular frequency of platform and winches as a coupled system [rad/s]."""
+    # shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N]
+    if kind == d.SECOND_ORDER:
+        return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
+    if kind == d.DRUMS:  # the largest eigenvalue is at most the sum of those with one mass only
+        drums = stiffness / (lengths.min(axis=0) * data[d.INERTIA])
+        return math.hypot(platform, math.sqrt(float(drums.max())))
+    return platform

@@ -17,16 +17,9 @@ from sagline.dynamics.simulation.initial_conditions import (
     check_set_points,
     initial_conditions,
 )
-from sagline.dynamics.simulation.plant import Plant, Records, energy_error
-from sagline.dynamics.simulation.simulate import (
-    Integrator,
-    checked_damping,
-    initial_plant,
-    integrator_code,
-    load_bits,
-    time_step,
-)
-from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding, checked_winding, winch_kind
+from sagline.dynamics.simulation.plant import Records, energy_error
+from sagline.dynamics.simulation.simulate import Integrator, initial_plant
+from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.cable.geometry import LENGTH
 from sagline.kernels.dynamics import drives as d
@@ -122,18 +115,14 @@ class Simulator:
             1.0 s, 2.034 m
         """
         given: InitialConditions = initial_conditions(_at_rest(instance(robot, Robot, "robot"), start), None, None, 1.0)
-        kind, losses = winch_kind(winches), checked_damping(damping)
-        code = integrator_code(integrator, kind)
-        winding = checked_winding(winding, kind)
-        self._plant: Plant = initial_plant(given, winches, False)
-        if winding == "remembered" and kind == d.DRUMS:
-            self._plant.remember_winding(2.0 * float(given.lengths.value.max()))
-        self._step = time_step(given, self._plant, step, code, kind, losses, ())
-        self._kind, plant, m = kind, self._plant, given.robot.cable_count
+        plant, rules, self._step, losses = initial_plant(
+            given, 0, step, integrator, winches, winding, damping, spare=2.0
+        )
+        code, kind, remembered, loads, stride = rules
+        self._plant, self._kind, m = plant, kind, given.robot.cable_count
         self._set_up_course(given, m)
         lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
-        stride = round(d.LOOP_PERIOD / self._step) if kind == d.DRUMS else 1
-        rules = (code, kind, int(winding == "remembered"), load_bits(losses, given.wrench, False) | LOADED, stride)
+        rules = (code, kind, remembered, loads | LOADED, stride)
         numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
         inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)))
         self._records = Records(0, m).arrays

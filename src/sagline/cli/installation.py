@@ -1,22 +1,63 @@
-"""`sagline cache`: the folder with the kernels that numba has compiled."""
+"""`sagline examples` and `sagline cache`: the files of the examples, and the compiled kernels."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from contextlib import suppress
+from importlib.resources import files
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
+import sagline as sl
+from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.options import JsonOption, flag
+from sagline.cli.output import Output
 from sagline.cli.terminal import show_json, show_note, show_text
-from sagline.core.errors import FileError
 from sagline.core.numbers import counted, n
+from sagline.files.writing import atomic_file, create_folder
+
+KINDS = (".py", ".yaml", ".csv", ".wcrfx")
+
+
+def examples(
+    folder: opt.OutOption = Path("sagline-examples"),
+    force: opt.ForceOption = False,
+) -> None:
+    """Write the files that the commands of the documentation use: a robot, a path, lengths, measurements and scripts.
+
+    For example:
+
+        sagline examples --out DIR
+        cd DIR
+        sagline track own_robot.yaml own_path.yaml
+    """
+    sources = example_files()
+    Output(folder, "", [file.name for file in sources])  # `Outputs` raises an error if a file cannot be written
+    existing = [file.name for file in sources if (folder / file.name).exists()]
+    if existing and not force:
+        raise sl.FileError(
+            folder / existing[0], "exists", "Choose another folder with --out, or replace it with --force."
+        )
+    create_folder(folder)
+    for file in sources:
+        with atomic_file(folder / file.name) as partial:
+            shutil.copyfile(file, partial)
+    show_text(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}", whole=True)
+    show_text(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml", whole=True)
+
+
+def example_files() -> list[Path]:
+    """Folder of the example files: next to the installed modules, or next to the docs in the source tree."""
+    inside = Path(str(files("sagline"))) / "examples"
+    folder = inside if inside.is_dir() else Path(__file__).parents[3] / "examples"
+    return sorted(file for file in folder.glob("*") if file.suffix in KINDS)
 
 
 def cache(
-    clear: Annotated[bool, flag("Remove the files.", "--clear")] = False,
-    as_json: JsonOption = False,
+    clear: Annotated[bool, opt.flag("Remove the files.", "--clear")] = False,
+    as_json: opt.JsonOption = False,
 ) -> int:
     """Show and check the folder with the kernels that numba has compiled, or remove its files.
 
@@ -28,7 +69,6 @@ def cache(
         sagline cache
         sagline cache --clear
     """
-    from sagline.kernels.jit import backend
     from sagline.kernels.sources import SUFFIX, base_folder
 
     folder = base_folder()
@@ -37,11 +77,11 @@ def cache(
     if clear:
         _remove(files)
     if as_json:
-        found = {"backend": backend(), "folder": folder, "files": len(files), "bytes": sum(sizes)}
+        found = {"backend": sl.backend(), "folder": folder, "files": len(files), "bytes": sum(sizes)}
         show_json({**found, "damaged": damaged, "writable": _is_writable(folder), "cleared": clear})
     else:
         access = "" if _is_writable(folder) else ", which cannot be written, so each run compiles its kernels"
-        show_text(f"Back end of the kernels: {backend()}", whole=True)
+        show_text(f"Back end of the kernels: {sl.backend()}", whole=True)
         show_text(f"Folder: {folder}{access}", whole=True)
         show_text(f"{counted(len(files), 'file')}, {n(sum(sizes) / 1e6, '.3g', 'MB')}{', removed' * clear}")
         for file in damaged:
@@ -71,7 +111,7 @@ def _remove(files: list[Path]) -> None:
         try:
             file.unlink(missing_ok=True)
         except OSError as error:
-            raise FileError(
+            raise sl.FileError(
                 file, f"cannot be removed ({error.strerror})", "Check the permissions of its folder."
             ) from None
     for folder in {file.parent for file in files}:
