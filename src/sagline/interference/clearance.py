@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,20 +28,6 @@ from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 
 BLOCK = 1024  # poses per block
-
-
-class _Distances(NamedTuple):
-    """Distances of P pairs at N poses.
-
-    Attributes:
-        value: Distances minus radii [m], shape (N, P); NaN if a cable has no tension.
-        low: Proved lower bounds [m], shape (N, P).
-        nearest: Nearest points, on the center lines of cables and rods [m], shape (N, P, 2, 3).
-    """
-
-    value: Array
-    low: Array
-    nearest: Array
 
 
 class ClearanceRows:
@@ -75,11 +61,11 @@ class ClearanceRows:
 
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
-    def distances(self, state: Equilibrium, *, together: bool = False) -> _Distances:
+    def distances(self, state: Equilibrium, *, together: bool = False) -> tuple[Array, Array, Array]:
         """Distance of every pair at every pose. With `together`, only the smallest distance of each pose is exact."""
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
-        out = _Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
+        out = np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3))
         known, memory = len(self.pairs.by_kernel), work_arrays_for_pieces()  # new arrays, because of threads
         for part in blocks(count, BLOCK):
             own = state if single else state[part]
@@ -89,9 +75,9 @@ class ClearanceRows:
             for whole, piece in zip(out, some, strict=True):
                 whole[part, :known] = piece
             if self._meshed is not None:
-                rest = _Distances(*(whole[part, known:] for whole in out))
-                least = out.value[part, :known].min(axis=1, initial=np.inf)
-                self._meshed.measure(own.pose, moving, least if together else None, rest)
+                value, low, nearest = (whole[part, known:] for whole in out)
+                least = out[0][part, :known].min(axis=1, initial=np.inf)
+                self._meshed.measure(own.pose, moving, least if together else None, (value, low, nearest))
             lost = np.isnan(np.atleast_2d(own.free_length)).any(axis=1)
             for whole in out:
                 whole[part][lost] = np.nan
@@ -100,7 +86,7 @@ class ClearanceRows:
     def least(self, state: Equilibrium) -> tuple[Array, Indices]:
         """Smallest distance (N,) [m], NaN without tensions, and the index of its pair. Faster than `distances`."""
         lost = np.asarray(np.isnan(np.atleast_2d(state.free_length)).any(axis=1))
-        found = np.nan_to_num(self.distances(state, together=True).value, nan=np.inf)
+        found = np.nan_to_num(self.distances(state, together=True)[0], nan=np.inf)
         if not found.shape[1]:
             return np.where(lost, np.nan, np.inf), np.full(len(lost), -1)
         pair = np.where(lost, -1, found.argmin(axis=1))

@@ -52,13 +52,8 @@ class _Solid(NamedTuple):
     place: tuple[Array, Array]
 
 
-class _Nearest(NamedTuple):
-    """Distance [m], its proved lower bound, and the nearest points."""
-
-    value: float
-    low: float
-    one: Array
-    other: Array
+_Nearest = tuple[float, float, Array, Array]
+"""Distance [m], its proved lower bound, and the nearest points."""
 
 
 class Meshed:
@@ -85,10 +80,10 @@ class Meshed:
                 at = {self._parts: (turns[n], places[n])}
                 row = moving[n, i] if i < self._parts else None
                 found = self._of_cable(row, j, at, enough) if row is not None else self._of_solids(i, j, at)
-                value[n, q], low[n, q] = found.value, found.low
-                nearest[n, q] = found.one, found.other
+                value[n, q], low[n, q] = found[:2]
+                nearest[n, q] = found[2:]
                 if least is not None:
-                    enough = min(enough, found.value)
+                    enough = min(enough, found[0])
 
     def _solid(self, form: Form | None) -> _Solid:
         still = np.eye(3), np.zeros(3)
@@ -122,7 +117,7 @@ class Meshed:
         if distance > 0.0 and (self._within(one.inner, i, j, at) or self._within(other.inner, j, i, at)):
             distance = 0.0
         radii = one.radius + other.radius
-        return _Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
+        return (distance - radii, _proved(distance, distance, a) - radii, a, b)
 
     def _within(self, point: Array, of: int, number: int, at: dict[int, tuple[Array, Array]]) -> bool:
         """True if `point` of the body `of`, in the frame of that body, is inside the solid body `number`."""
@@ -172,7 +167,7 @@ class Meshed:
 
         look_at([(float(row[shapes.FIRST]), float(row[shapes.LAST]))])
         if self._within(_pieces(row, [(nearest[1], nearest[1])])[0, :3].copy(), -1, number, at):
-            return _Nearest(-radius, -radius, nearest[2], nearest[2])
+            return (-radius, -radius, nearest[2], nearest[2])
         while waiting:
             low, _, begin, end, bulge = heapq.heappop(waiting)
             if low >= min(nearest[0], enough) - self._precision or bulge == 0.0 or looked > _PIECES:
@@ -182,7 +177,7 @@ class Meshed:
             look_at([(begin, middle), (middle, end)])
         if nearest[0] < enough + self._precision:
             nearest = _polished(at_share, nearest, row)
-        return _Nearest(nearest[0] - radius, _proved(proved, nearest[0], nearest[2]) - radius, nearest[2], nearest[3])
+        return (nearest[0] - radius, _proved(proved, nearest[0], nearest[2]) - radius, nearest[2], nearest[3])
 
 
 def package() -> ModuleType:

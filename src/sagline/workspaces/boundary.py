@@ -71,18 +71,6 @@ class Boundary(Result):
     evaluations: int
 
 
-class _Counted:
-    """Level function with a counter of the positions at which it was evaluated."""
-
-    def __init__(self, level: Level) -> None:
-        self._level = level
-        self.count = 0
-
-    def __call__(self, positions: Array) -> Array:
-        self.count += len(positions)
-        return self._level(positions)
-
-
 def boundary(
     level: Level,
     low: ArrayLike,
@@ -105,7 +93,13 @@ def boundary(
     numbers = _cells_of(cells, corners[1] - corners[0])
     most = min(MOST_HALVINGS, (MOST_HALVED // max(numbers)).bit_length() - 1)
     halvings = whole_number(int(refine) if isinstance(refine, bool) else refine, "refine", 0, most)
-    counted = _Counted(level)
+    count = 0
+
+    def counted(positions: Array) -> Array:
+        nonlocal count
+        count += len(positions)
+        return level(positions)
+
     first = grid = sample_grid(counted, *corners, numbers)
     for _ in range(halvings):
         grid = refine_grid(grid, counted)
@@ -122,7 +116,7 @@ def boundary(
     volumes[curved] += between
     volume, error = float(volumes.sum()), float(errors.sum())
     components = components_of(grid, labels_of(counted, grid)[0], net.inner, net.faces, volumes)
-    return Boundary(surface, volume, error, first, components, open_faces, counted.count)
+    return Boundary(surface, volume, error, first, components, open_faces, count)
 
 
 INWARD: Final = 0.01  # distance, relative to a cell, from a vertex to the position at which the slope is computed

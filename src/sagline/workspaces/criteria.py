@@ -86,7 +86,7 @@ class MaximumSag(Criterion):
     def judge(self, given: Given) -> Judged:
         """Limit minus largest sag [m], and the cable with the largest sag."""
         sag = given.state.cables.sag
-        return Judged(given.spread(self.limit - sag.max(axis=1)), given.spread_cables(sag.argmax(axis=1)))
+        return Judged(given.spread(self.limit - sag.max(axis=1)), given.spread(sag.argmax(axis=1), -1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -213,7 +213,7 @@ class Clearance(Criterion):
         rows = _clearance_rows(given.robot, self.obstacles)
         value, pair = rows.least(given.state)
         cables = np.array([*map(_cable_of, rows.pairs.names), -1])
-        return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
+        return Judged(given.spread(value - self.limit), given.spread(cables[pair], -1))
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
         """True for each box in which, at every position, an obstacle is nearer than the limit."""

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Flags, Indices, locked, number
@@ -80,16 +81,10 @@ class Given:
         """Equilibria at the K poses."""
         return self.plan.state
 
-    def spread(self, values: Array) -> Array:
-        """Values (N,) at all poses from values (K,) at the K poses; NaN at the other poses."""
-        found = np.full(len(self), np.nan)
+    def spread(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
+        """Values (N,) at all poses from values (K,) at the K poses; `missing` at the other poses."""
+        found = np.full(len(self), missing)
         found[self.held] = values
-        return locked(found)
-
-    def spread_cables(self, cables: Indices) -> Indices:
-        """Indices of cables (N,) at all poses from indices (K,) at the K poses; -1 at the other poses."""
-        found = np.full(len(self), -1)
-        found[self.held] = cables
         return locked(found)
 
 

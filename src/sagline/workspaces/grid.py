@@ -229,22 +229,9 @@ def brackets(
     return Brackets(inner, outer, at_inner, at_outer, found)
 
 
-def crossings(
-    level: Level,
-    inner: Array,
-    outer: Array,
-    at_inner: Array,
-    at_outer: Array,
-    *,
-    precision: float = 1e-10,
-    narrow: float = 1e-12,
-) -> Array:
+def crossings(level: Level, inner: Array, outer: Array, at_inner: Array, at_outer: Array, **limits: float) -> Array:
     """As `crossings_of`, with one function for all V lines."""
-
-    def values(_: Indices, positions: Array) -> Array:
-        return level_values(level, positions)
-
-    return crossings_of(values, inner, outer, at_inner, at_outer, precision=precision, narrow=narrow)
+    return crossings_of(lambda _, positions: level_values(level, positions), inner, outer, at_inner, at_outer, **limits)
 
 
 def crossings_of(

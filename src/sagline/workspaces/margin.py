@@ -104,12 +104,10 @@ class MarginRows:
 
     def about(self, wrench: Array) -> MarginRows:
         """Margins for the wrench set plus an unchecked wrench [N, N m], (6,); all other data are shared."""
-        model, limits, terms, (center, half, others, ellipsoids, corners, sizes, rates, inertias), arms = self._given
-        there = _locked(center + wrench)
+        model, limits, terms, loads, arms = self._given
         moved = object.__new__(MarginRows)
         moved.cable_count, moved.robot_count = self.cable_count, self.robot_count
-        loads = (there, half, others, ellipsoids, corners, sizes, rates, inertias)
-        moved._given = (model, limits, terms, loads, arms)
+        moved._given = (model, limits, terms, (_locked(loads[0] + wrench), *loads[1:]), arms)
         return moved
 
     def rows(self, poses: NDArray[np.float64], progress: Progress | None = None) -> Bracket:

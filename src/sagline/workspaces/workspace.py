@@ -12,7 +12,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import brief, callback, choice, instance, whole_number
-from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
+from sagline.core.arrays import Array, Codes, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
@@ -25,7 +25,7 @@ from sagline.workspaces.boundary import MOST_CELLS, boundary, uncertain_volume
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_continuous
 from sagline.workspaces.levels import Hull, Levels, Nearest, nearest_to
-from sagline.workspaces.region import AXES, Orientations, Region, Tilts, flat_axis, orientations_of, region_of
+from sagline.workspaces.region import AXES, Orientations, Tilts, flat_axis, orientations_of, region_of
 from sagline.workspaces.separation import exclusion, separated
 from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
@@ -170,22 +170,17 @@ class Workspace(Result, Saved):
 
     def __str__(self) -> str:
         """Summary in lines of at most 80 columns."""
-        return "\n".join(_summary_lines(self)).replace(SPACE, " ")
-
-
-def _summary_lines(space: Workspace) -> list[str]:
-    """Summary of a workspace in lines of at most 80 columns."""
-    lines = [f"Workspace of {space.robot.name}: {amount_of(space)}"]
-    for head, text in facts_of(space):
-        lines += wrap(text, _WIDTH, initial_indent=f"  {head:<{_HEAD}}", subsequent_indent=" " * (_HEAD + 2))
-    limits = space.limits
-    if limits:
-        lines.append("  limited by, in shares of its surface:")
-        lines += [f"    {n(100.0 * limit.share, '.1f'):>5} %  {limit}" for limit in limits[:MOST_LIMITS]]
+        lines = [f"Workspace of {self.robot.name}: {amount_of(self)}"]
+        for head, text in facts_of(self):
+            lines += wrap(text, _WIDTH, initial_indent=f"  {head:<{_HEAD}}", subsequent_indent=" " * (_HEAD + 2))
+        limits = self.limits
+        if limits:
+            lines.append("  limited by, in shares of its surface:")
+            lines += [f"    {n(100.0 * limit.share, '.1f'):>5} %  {limit}" for limit in limits[:MOST_LIMITS]]
         if len(limits) > MOST_LIMITS:
             rest = sum(limit.share for limit in limits[MOST_LIMITS:])
             lines.append(f"    {n(100.0 * rest, '.1f'):>5} %  {counted(len(limits) - MOST_LIMITS, 'other')}")
-    return lines
+        return "\n".join(lines).replace(SPACE, " ")
 
 
 def amount_of(space: Workspace) -> str:
@@ -319,7 +314,10 @@ def workspace(
         components = replace(components, separate=separated(components, exclusion(levels)))
     decided = levels.details(surface.vertices)
     error = found.volume_error + uncertain_volume(levels, surface, decided.uncertainty, float(found.grid.step.max()))
-    on_box = _on_box(surface.vertices, region) & (decided.level > 1e-6)
+    near = ON_BOX * float((region.high - region.low).max())
+    beside = (surface.vertices - region.low < near) | (region.high - surface.vertices < near)
+    on_box = beside.any(axis=1) & (decided.level > 1e-6)
+    flat = None if region.flat is None else AXES[region.flat]  # the faces of the slab around a plane are not open
     return Workspace(
         robot=robot,
         box=region.box,
@@ -338,7 +336,7 @@ def workspace(
         limiting=locked(np.where(on_box, BY_BOX, decided.criterion).astype(np.int8)),
         limiting_cable=locked(np.where(on_box, -1, decided.cable)),
         margin=decided.margin,
-        open_faces=_open_faces(found.open_faces, region),
+        open_faces=tuple(face for face in found.open_faces if face[0] != flat),
         x=found.grid.x,
         y=found.grid.y,
         z=found.grid.z,
@@ -371,15 +369,3 @@ def _checked(robot: Robot, criteria: Sequence[Criterion], tension: TensionMethod
     if any(isinstance(one, LeastMargin) for one in criteria):
         return tuple(sorted(criteria, key=lambda one: not isinstance(one, LeastMargin)))
     return LeastMargin(), *criteria
-
-
-def _on_box(vertices: Array, region: Region) -> Flags:
-    """Mask of vertices on a face of the region."""
-    near = ON_BOX * float((region.high - region.low).max())
-    return np.asarray(((vertices - region.low < near) | (region.high - vertices < near)).any(axis=1))
-
-
-def _open_faces(faces: Sequence[str], region: Region) -> tuple[str, ...]:
-    """Faces of the box that the workspace reaches, without the faces of the slab around a plane."""
-    flat = None if region.flat is None else AXES[region.flat]
-    return tuple(face for face in faces if face[0] != flat)

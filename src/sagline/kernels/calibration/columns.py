@@ -13,7 +13,7 @@ from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Slopes, Unknowns
+from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Unknowns
 from sagline.kernels.forward.platform import end_stiffness
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.statics import Triple, components_along, fill_motion_of_components, is_rotation
@@ -148,21 +148,21 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 
 @glue
-def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
+def add_motion(space: CalibrationArrays) -> None:
     """Add changes of readings to the columns. Wrench changes move the platform, which changes the readings."""
-    for j in range(slopes.work.shape[0]):
+    for j in range(space.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]
-            for q in range(slopes.work.shape[1]):
-                slopes.work[j, q] -= share * slopes.wrench[k, q]
+            for q in range(space.work.shape[1]):
+                space.work[j, q] -= share * space.wrench[k, q]
 
 
 @glue
-def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: Array) -> None:
+def fill_motion(free: Array, space: CalibrationArrays, motion: Array) -> None:
     """Fill the platform motions: one row per meter of each cable, and a last row per unit of the first unknown."""
     m = space.by_wrench.shape[0]
     for k in range(6):
-        space.six[k] = slopes.wrench[k, 0]
+        space.six[k] = space.wrench[k, 0]
     for i in range(m + 1):
         fill_motion_by_wrench(free, space.by_wrench[i] if i < m else space.six, space, motion[i])
         for k in range(6):
@@ -216,20 +216,18 @@ def _in_world_axes(rows: Array, i: int, pair: PlaneVector) -> Triple:
 
 
 @formula
-def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, moment: Triple) -> None:
+def _add_wrench_change(space: CalibrationArrays, at: int, scale: float, force: Triple, moment: Triple) -> None:
     """Add a change of the wrench on the platform to a column."""
     for k in range(3):
-        slopes.wrench[k, at] += scale * force[k]
-        slopes.wrench[3 + k, at] += scale * moment[k]
+        space.wrench[k, at] += scale * force[k]
+        space.wrench[3 + k, at] += scale * moment[k]
 
 
 @formula
-def _add_force_change(
-    slopes: Slopes, space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float
-) -> None:
+def _add_force_change(space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float) -> None:
     """Add to a column the effects of a change of one cable force, on the wrench and on the reading of this cable."""
-    _add_wrench_change(slopes, at, scale, force, cross(_lever_of(space.rows, i), force))
-    slopes.work[i, at] += scale * direct
+    _add_wrench_change(space, at, scale, force, cross(_lever_of(space.rows, i), force))
+    space.work[i, at] += scale * direct
 
 
 @kernel
@@ -241,14 +239,13 @@ def _add_parameter_change(
     pair: PlaneVector,
     alone: float,
     space: CalibrationArrays,
-    slopes: Slopes,
 ) -> None:
     """Add to a column the effects of a parameter of cable i, on its platform-end force and on its frame-end tension."""
     at = sought.where[row, i]
     if at >= 0:
         change = _in_world_axes(space.rows, i, pair)
         direct = gain * (_tension_by_force(space.shares, i, change) + alone)
-        _add_force_change(slopes, space, i, at, sought.scale[row, i], change, direct)
+        _add_force_change(space, i, at, sought.scale[row, i], change, direct)
 
 
 @glue
@@ -286,7 +283,7 @@ def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple
 
 @glue
 def fill_cable(
-    model: Model, cables: Array, gain: float, sought: Unknowns, p: int, i: int, space: CalibrationArrays, slopes: Slopes
+    model: Model, cables: Array, gain: float, sought: Unknowns, p: int, i: int, space: CalibrationArrays
 ) -> None:
     """Add the unknowns of cable `i` to the columns, and fill the derivatives with respect to the cable's length."""
     where, scale, rows, ends, shares = sought.where, sought.scale, space.rows, space.ends, space.shares
@@ -297,15 +294,15 @@ def fill_cable(
             change = opposite(_force_by_motion(ends, i, unit_vector(axis)))
             fall = shares[i, 3] if axis == 2 else 0.0
             direct = gain * (_tension_by_force(shares, i, change) - fall)
-            _add_force_change(slopes, space, i, at, scale[kinds.FRAME + axis, i], change, direct)
+            _add_force_change(space, i, at, scale[kinds.FRAME + axis, i], change, direct)
         at = where[kinds.PLATFORM + axis, i]
         if at >= 0:
             moved = column_of(space.rotation, axis)
             change = _force_by_motion(ends, i, moved)
             moment = plus(cross(moved, force), cross(lever, change))
-            _add_wrench_change(slopes, at, scale[kinds.PLATFORM + axis, i], change, moment)
+            _add_wrench_change(space, at, scale[kinds.PLATFORM + axis, i], change, moment)
             direct = gain * (_tension_by_force(shares, i, change) + shares[i, 3] * moved[2])
-            slopes.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
+            space.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
     by = frame_end_slopes(model, cables, rows, i)
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
@@ -314,10 +311,10 @@ def fill_cable(
     else:
         free = rows[g.FREE_LENGTH, i]
         own = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
-        _add_parameter_change(sought, kinds.RADIUS, i, gain, own.by_radius, by.by_radius, space, slopes)
-        _add_parameter_change(sought, kinds.DEAD, i, gain, own.by_dead, by.by_dead, space, slopes)
-    _add_parameter_change(sought, kinds.DENSITY, i, gain, own.by_density, by.by_density, space, slopes)
-    _add_parameter_change(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space, slopes)
+        _add_parameter_change(sought, kinds.RADIUS, i, gain, own.by_radius, by.by_radius, space)
+        _add_parameter_change(sought, kinds.DEAD, i, gain, own.by_dead, by.by_dead, space)
+    _add_parameter_change(sought, kinds.DENSITY, i, gain, own.by_density, by.by_density, space)
+    _add_parameter_change(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space)
     change = _in_world_axes(rows, i, own.by_length)
     direct = gain * (_tension_by_force(shares, i, change) + by.by_length)
     fill_length(space, i, change, cross(lever, change), direct)
@@ -325,11 +322,11 @@ def fill_cable(
         row = kinds.STIFFNESS if k == 2 else kinds.ZERO + k
         at = where[row, i]
         if at >= 0:
-            _add_force_change(slopes, space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
+            _add_force_change(space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
     if where[kinds.GAIN, i] >= 0:
-        slopes.work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * by.tension
+        space.work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * by.tension
     if where[kinds.BIAS, i] >= 0:
-        slopes.work[i, where[kinds.BIAS, i]] += scale[kinds.BIAS, i]
+        space.work[i, where[kinds.BIAS, i]] += scale[kinds.BIAS, i]
 
 
 @formula
@@ -345,7 +342,7 @@ def _free_displacement(free: Array, vector: Triple) -> Triple:
 
 @glue
 def _fill_center(
-    cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays, slopes: Slopes
+    cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays
 ) -> None:
     """Add to the columns the effect of a shift of the center of mass, the reference point of platform motion.
 
@@ -357,14 +354,14 @@ def _fill_center(
     for i in range(m):
         change = _force_by_motion(space.ends, i, back)
         moment = plus(cross(back, _force_at(space.rows, i)), cross(_lever_of(space.rows, i), change))
-        _add_wrench_change(slopes, at, scale, change, moment)
+        _add_wrench_change(space, at, scale, change, moment)
         own = _tension_by_force(space.shares, i, change) + space.shares[i, 3] * back[2]
-        slopes.work[i, at] += scale * sensing.gain[i] * own
-    if slopes.work.shape[0] == m:
+        space.work[i, at] += scale * sensing.gain[i] * own
+    if space.work.shape[0] == m:
         return
     shifted = in_axes(space.axes, back)
     for k in range(3):
-        slopes.work[m + k, at] += scale * shifted[k]
+        space.work[m + k, at] += scale * shifted[k]
 
 
 @glue
@@ -376,18 +373,17 @@ def fill_platform(
     free: Array,
     from_system: Triple,
     space: CalibrationArrays,
-    slopes: Slopes,
 ) -> None:
     """Add the unknowns of the platform and of the measuring system to the columns."""
     m = cables.shape[0]
     where, scale = sought.where, sought.scale
     if where[kinds.MASS, 0] >= 0:
         none = (0.0, 0.0, 0.0)
-        _add_wrench_change(slopes, where[kinds.MASS, 0], scale[kinds.MASS, 0], (0.0, 0.0, model.gravity), none)
+        _add_wrench_change(space, where[kinds.MASS, 0], scale[kinds.MASS, 0], (0.0, 0.0, model.gravity), none)
     for axis in range(3):
         if where[kinds.CENTER + axis, 0] >= 0:
-            _fill_center(cables, sensing, sought, free, axis, space, slopes)
-        if slopes.work.shape[0] == m:
+            _fill_center(cables, sensing, sought, free, axis, space)
+        if space.work.shape[0] == m:
             continue
         unit = unit_vector(axis)
         shifted, around = in_axes(space.axes, unit), in_axes(space.axes, cross(from_system, unit))
@@ -395,11 +391,11 @@ def fill_platform(
         for k in range(3):
             at = where[kinds.SHIFT + axis, 0]
             if at >= 0:
-                slopes.work[m + k, at] -= scale[kinds.SHIFT + axis, 0] * shifted[k]
+                space.work[m + k, at] -= scale[kinds.SHIFT + axis, 0] * shifted[k]
             at = where[kinds.TURN + axis, 0]
             if at >= 0:
-                slopes.work[m + k, at] += scale[kinds.TURN + axis, 0] * around[k]
-                slopes.work[m + 3 + k, at] -= scale[kinds.TURN + axis, 0] * shifted[k]
+                space.work[m + k, at] += scale[kinds.TURN + axis, 0] * around[k]
+                space.work[m + 3 + k, at] -= scale[kinds.TURN + axis, 0] * shifted[k]
             at = where[kinds.TARGET + axis, 0]
             if at >= 0:
-                slopes.work[m + k, at] += scale[kinds.TARGET + axis, 0] * outward[k]
+                space.work[m + k, at] += scale[kinds.TARGET + axis, 0] * outward[k]

@@ -16,58 +16,25 @@ from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import chord_tension_at_frame_end, hold_cable
 from sagline.kernels.cable.terms import Model, Terms, chord_at, material_at, model_of
-from sagline.kernels.calibration.columns import (
-    add_motion,
-    fill_cable,
-    fill_ends,
-    fill_motion,
-    fill_platform,
-    fill_readings_by_wrench,
-    in_axes,
-    opposite,
-    plus,
-    unit_vector,
-)
-from sagline.kernels.calibration.terms import (
-    BESIDE,
-    CalibrationArrays,
-    Linearization,
-    LinearizationArrays,
-    PoseReadings,
-    ReadingArrays,
-    Sensing,
-    SensingArrays,
-    Slopes,
-    UnknownArrays,
-    Unknowns,
-    new_calibration_arrays,
-)
-from sagline.kernels.forward.platform import (
-    ForwardSamples,
-    ForwardTerms,
-    SampleArrays,
-    platform_stiffness,
-    row_of,
-    unbalance,
-)
+from sagline.kernels.calibration import columns
+from sagline.kernels.calibration import terms as t
+from sagline.kernels.forward import platform
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import Triple, components_along, symmetric_part, turned
 
 
 @glue
-def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Array) -> None:
+def whiten(sensing: t.Sensing, residual: Array, space: t.CalibrationArrays) -> None:
     """Omit missing readings, and fill W so that W^T W is the inverse of the covariance."""
-    readings, m = work.shape[0], residual.size - BESIDE
+    readings, m = space.work.shape[0], residual.size - t.BESIDE
     for j in range(residual.size):
         if not (abs(residual[j]) < math.inf and space.deviation[j] < math.inf):
             residual[j] = math.nan
             if j >= readings:
                 continue
-            for i in range(m):
-                space.by_length[i, j] = 0.0
-            for q in range(work.shape[1]):
-                work[j, q] = 0.0
+            space.by_length[:, j] = 0.0
+            space.work[j] = 0.0
             space.deviation[j] = 1.0
     for j in range(readings):
         for k in range(j + 1):
@@ -79,8 +46,7 @@ def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Ar
             space.whole[k, j] = total
     factor_positive(space.whole, 0.0, space.own)
     for k in range(readings):  # store all of W, column by column
-        for j in range(readings):
-            space.whole[j, k] = 0.0
+        space.whole[:, k] = 0.0
         space.whole[k, k] = 1.0 / space.own[k, k]
         for j in range(k + 1, readings):
             total = 0.0
@@ -91,7 +57,12 @@ def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Ar
 
 @glue
 def store_linearization(
-    sensing: Sensing, answer: Linearization, p: int, reading_arrays: Array, lengths: Array, space: CalibrationArrays
+    sensing: t.Sensing,
+    answer: t.Linearization,
+    p: int,
+    reading_arrays: Array,
+    lengths: Array,
+    space: t.CalibrationArrays,
 ) -> None:
     """Store the linearization of pose `p`."""
     residual, matrix, whole = answer.residual[p], answer.matrix[p], space.whole
@@ -103,8 +74,7 @@ def store_linearization(
         space.deviation[j] = 0.0 if math.isnan(residual[j]) else total
     for j in range(readings):
         total = 0.0
-        for q in range(matrix.shape[1]):
-            matrix[j, q] = 0.0
+        matrix[j] = 0.0
         for k in range(j + 1):
             total += whole[j, k] * space.deviation[k]
             for q in range(matrix.shape[1]):
@@ -143,20 +113,20 @@ def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Tripl
 
 @glue
 def _fill_residual(
-    sensing: Sensing,
-    readings: PoseReadings,
+    sensing: t.Sensing,
+    readings: t.PoseReadings,
     p: int,
     pose: Array,
     from_system: Triple,
-    space: CalibrationArrays,
+    space: t.CalibrationArrays,
     residual: Array,
 ) -> None:
     """Fill readings minus predictions, and the standard deviations, which are infinite for missing readings."""
-    m = residual.size - BESIDE
+    m = residual.size - t.BESIDE
     for i in range(m):
         residual[i] = readings.cells[p, i] - (sensing.gain[i] * space.shares[i, 4] + sensing.bias[i])
         space.deviation[i] = sensing.tension_deviation[i]
-    place = in_axes(space.axes, from_system)
+    place = columns.in_axes(space.axes, from_system)
     turn = _rotation_between(readings.rotations[p], pose, sensing.frame)
     for k in range(3):
         residual[m + k] = readings.positions[p, k] - place[k]
@@ -167,13 +137,13 @@ def _fill_residual(
 
 @entry
 def observe(
-    model: ForwardTerms,
-    given: SampleArrays,
-    sensing: SensingArrays,
-    reading_arrays: ReadingArrays,
-    unknown_arrays: UnknownArrays,
+    model: platform.ForwardTerms,
+    given: platform.SampleArrays,
+    sensing: t.SensingArrays,
+    reading_arrays: t.ReadingArrays,
+    unknown_arrays: t.UnknownArrays,
     memory: tuple[Array, Indices],
-    found: LinearizationArrays,
+    found: t.LinearizationArrays,
 ) -> None:
     """Residuals and derivatives at N equilibria; NaN at unstable equilibria.
 
@@ -186,25 +156,25 @@ def observe(
         memory: Work arrays from `memory_for`, for the number of cables.
         found: `Linearization`, which is filled.
     """
-    batch, sensors, readings = ForwardSamples(*given), Sensing(*sensing), PoseReadings(*reading_arrays)
-    sought, answer = Unknowns(*unknown_arrays), Linearization(*found)
+    batch, sensors = platform.ForwardSamples(*given), t.Sensing(*sensing)
+    readings, sought, answer = t.PoseReadings(*reading_arrays), t.Unknowns(*unknown_arrays), t.Linearization(*found)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     free = batch.freedom
-    space = new_calibration_arrays(Memory(*memory), m, free.shape[0], answer.work.shape[0] - 6)
-    slopes = Slopes(answer.work[:-6], answer.work[-6:])
+    space = t.new_calibration_arrays(Memory(*memory), m, free.shape[0], answer.work)
     for axis in range(3):
-        unit = unit_vector(axis)
+        unit = columns.unit_vector(axis)
         x, y, z = turned(sensors.frame, unit[0], unit[1], unit[2])
         space.axes[0, axis], space.axes[1, axis], space.axes[2, axis] = x, y, z
     for p in range(count):
-        body, cables, pose = row_of(batch.bodies, p), row_of(batch.robots, p), batch.starts[p]
+        body, cables, pose = platform.row_of(batch.bodies, p), platform.row_of(batch.robots, p), batch.starts[p]
         placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         for i in range(m):
             space.rows[g.LENGTH, i] = batch.lengths[p, i]
             space.rows[g.PARAMETER, i] = math.nan  # a result must not depend on the previous sample
-        unbalance(placed, cables, body, row_of(batch.wrenches, p), pose, space.rotation, space.rows, space.six)
-        platform_stiffness(placed, cables, space.rows, space.stiffness)
+        wrench = platform.row_of(batch.wrenches, p)
+        platform.unbalance(placed, cables, body, wrench, pose, space.rotation, space.rows, space.six)
+        platform.platform_stiffness(placed, cables, space.rows, space.stiffness)
         symmetric_part(free, space.stiffness, space.matrix)
         if not factor_positive(space.matrix, 0.0, space.factor):
             answer.matrix[p] = math.nan
@@ -216,22 +186,20 @@ def observe(
             continue
         center = turned(pose, body[tables.CENTER_X], body[tables.CENTER_Y], body[tables.CENTER_Z])
         target = turned(pose, sensors.target[0], sensors.target[1], sensors.target[2])
-        reach = plus(target, opposite(center))
+        reach = columns.plus(target, columns.opposite(center))
         shift = (sensors.frame[0], sensors.frame[1], sensors.frame[2])
-        from_system = plus(plus((pose[0], pose[1], pose[2]), target), opposite(shift))
-        fill_ends(placed, cables, space)
-        fill_readings_by_wrench(sensors, free, m, reach, space)
-        for j in range(answer.work.shape[0]):
-            for q in range(answer.work.shape[1]):
-                answer.work[j, q] = 0.0
+        from_system = columns.plus(columns.plus((pose[0], pose[1], pose[2]), target), columns.opposite(shift))
+        columns.fill_ends(placed, cables, space)
+        columns.fill_readings_by_wrench(sensors, free, m, reach, space)
+        answer.work[:] = 0.0
         for i in range(m):
-            fill_cable(placed, cables, sensors.gain[i], sought, p, i, space, slopes)
-        fill_platform(placed, cables, sensors, sought, free, from_system, space, slopes)
+            columns.fill_cable(placed, cables, sensors.gain[i], sought, p, i, space)
+        columns.fill_platform(placed, cables, sensors, sought, free, from_system, space)
         if answer.motion.shape[0] > 0:
-            fill_motion(free, space, slopes, answer.motion[p])
-        add_motion(space, slopes)
+            columns.fill_motion(free, space, answer.motion[p])
+        columns.add_motion(space)
         _fill_residual(sensors, readings, p, pose, from_system, space, answer.residual[p])
-        whiten(sensors, answer.residual[p], space, slopes.work)
+        whiten(sensors, answer.residual[p], space)
         store_linearization(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)
 
 
@@ -296,8 +264,7 @@ def starting_lengths(
                     matrix[j, k] += along[i, j] * along[i, k]
         positive = factor_positive(matrix, 0.0, factor)
         for _ in range(ITERATIONS):
-            for k in range(6):
-                six[k] = 0.0
+            six[:] = 0.0
             six[2] = body[tables.MASS] * model.gravity
             for i in range(m):
                 chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)

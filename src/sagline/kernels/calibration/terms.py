@@ -64,13 +64,6 @@ class Linearization(NamedTuple):
     work: Array  # work array: slopes of the readings and of the wrench on the platform, (R + 6, P)
 
 
-class Slopes(NamedTuple):
-    """Derivatives with respect to the P unknowns at one pose."""
-
-    work: Array  # slopes of the readings, (R, P); at first with a fixed platform
-    wrench: Array  # slopes of the wrench on the fixed platform about its center of mass, (6, P)
-
-
 class CalibrationArrays(NamedTuple):
     """Working memory of one pose."""
 
@@ -90,11 +83,14 @@ class CalibrationArrays(NamedTuple):
     whole: Array  # covariance, then the inverse of its factor, (R, R)
     own: Array  # (R, R)
     deviation: Array  # (m + 6,)
+    work: Array  # derivatives of the readings with respect to the P unknowns, (R, P); at first with a fixed platform
+    wrench: Array  # derivatives of the wrench on the fixed platform about its center of mass, (6, P)
 
 
 @glue
-def new_calibration_arrays(memory: Memory, m: int, n: int, readings: int) -> CalibrationArrays:
-    """Work arrays for `m` cables, `n` free motions and the number `readings` of readings."""
+def new_calibration_arrays(memory: Memory, m: int, n: int, work: Array) -> CalibrationArrays:
+    """Work arrays for `m` cables and `n` free motions; `work`: as in `Linearization`."""
+    readings = work.shape[0] - 6
     rows, memory = block(memory, CABLE_ROWS, m)
     rotation, memory = block(memory, 3, 3)
     axes, memory = block(memory, 3, 3)
@@ -113,5 +109,5 @@ def new_calibration_arrays(memory: Memory, m: int, n: int, readings: int) -> Cal
     deviation, memory = vector(memory, m + BESIDE)
     return CalibrationArrays(
         rows, rotation, axes, stiffness, factor, matrix, part, six, moved, ends, shares, by_wrench, by_length, whole,
-        own, deviation,
+        own, deviation, work[:-6], work[-6:],
     )  # fmt: skip

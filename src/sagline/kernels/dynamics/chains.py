@@ -14,28 +14,8 @@ from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics import progress
-from sagline.kernels.dynamics.drives import (
-    Drives,
-    add_winch_energy,
-    close_loops,
-    filter_tensions,
-    keep_set_points,
-    kick_winches,
-    store_step_start,
-    turn_winches,
-)
-from sagline.kernels.dynamics.rigid_body import (
-    CENTER,
-    MASS,
-    MOMENTUM,
-    VELOCITY,
-    drift_body,
-    free_turn,
-    kick_body,
-    kinetic_energy,
-    spin,
-)
+from sagline.kernels.dynamics import progress, rigid_body
+from sagline.kernels.dynamics.progress import Courses, Kept
 from sagline.kernels.jit import entry, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import turned
@@ -45,10 +25,6 @@ ROOM = 21
 Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], weight of a new reading in a load cell's filter
 Rules = tuple[int, int, int]  # kind of winches, remembered, steps per control period
 Body = tuple[Array, Array, Array, Array]  # cables, inertia, projection onto free motions, point of the given wrench
-Courses = tuple[
-    progress.CubicTableArrays, progress.CubicTableArrays, progress.CubicTableArrays
-]  # of lengths, wrenches, and wind velocity
-Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives, layers, audit, counters
 ChainArrays = tuple[Array, Array, Array, Array, Indices]
 Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes, points
 
@@ -73,7 +49,7 @@ class ChainRun(NamedTuple):
     inertia: Array
     free: Array
     handle: Array
-    drives: Drives
+    drives: d.Drives
     lengths: progress.CubicTable
     wrenches: progress.CubicTable
     winds: progress.CubicTable
@@ -102,12 +78,8 @@ def chain_run_of(
     wind, memory = vector(memory, 3)
     targets, memory = vector(memory, width)
     target_rates, memory = vector(memory, width)
-    lengths, wrenches, winds = (
-        progress.CubicTable(*courses[0]),
-        progress.CubicTable(*courses[1]),
-        progress.CubicTable(*courses[2]),
-    )
-    drives = Drives(kind, remembered > 0, data, now, layers, audit)
+    lengths, wrenches, winds = progress.time_tables(courses)
+    drives = d.Drives(kind, remembered > 0, data, now, layers, audit)
     return ChainRun(
         _Chains(*chain_arrays), step, gravity, body[0], body[1], body[2], body[3], drives, lengths, wrenches, winds,
         state, rows, at, targets, target_rates, small[0], small[1], wind, small[2],
@@ -134,7 +106,7 @@ def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
         run.wrenches, at[progress.WRENCH_AT], now, 0.0, run.given, run.spare
     )
     at[progress.WIND_AT] = progress.interpolate_table(run.winds, at[progress.WIND_AT], now, 0.0, run.wind, run.spare)
-    keep_set_points(run.drives, run.rows, run.targets, run.target_rates)
+    d.keep_set_points(run.drives, run.rows, run.targets, run.target_rates)
     _fill_last_elements(run)
 
 
@@ -143,19 +115,20 @@ def fill_platform_force(run: ChainRun) -> float:
     """Fill the force on the platform and the tensions at the winches. Returns the power lost [W]."""
     chains, drives, state, rows = run.chains, run.drives, run.state, run.rows
     ends = run.cables[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
+    center, velocity = state[rigid_body.CENTER :], state[rigid_body.VELOCITY :]
     lost = 0.0
-    wx, wy, wz = spin(state, run.inertia)
+    wx, wy, wz = rigid_body.spin(state, run.inertia)
     hx, hy, hz = turned(state, run.handle[0], run.handle[1], run.handle[2])
     gx, gy, gz = run.given[0], run.given[1], run.given[2]
-    fx, fy, fz = gx, gy, gz - run.inertia[MASS] * run.gravity
+    fx, fy, fz = gx, gy, gz - run.inertia[rigid_body.MASS] * run.gravity
     mx, my, mz = run.given[3] + hy * gz - hz * gy, run.given[4] + hz * gx - hx * gz, run.given[5] + hx * gy - hy * gx
     for i in range(chains.counts.shape[0]):
         n, row, place, speed = chains.counts[i], chains.table[i], chains.place[i], chains.speed[i]
         x, y, z = turned(state, ends[i, 0], ends[i, 1], ends[i, 2])
-        place[0, 0], place[1, 0], place[2, 0] = state[CENTER] + x, state[CENTER + 1] + y, state[CENTER + 2] + z
-        speed[0, 0] = state[VELOCITY] + (wy * z - wz * y)
-        speed[1, 0] = state[VELOCITY + 1] + (wz * x - wx * z)
-        speed[2, 0] = state[VELOCITY + 2] + (wx * y - wy * x)
+        place[0, 0], place[1, 0], place[2, 0] = center[0] + x, center[1] + y, center[2] + z
+        speed[0, 0] = velocity[0] + (wy * z - wz * y)
+        speed[1, 0] = velocity[1] + (wz * x - wx * z)
+        speed[2, 0] = velocity[2] + (wx * y - wy * x)
         c.fill_frame_node_velocity(place, speed, n, row)
         lost += c.fill_element_forces(place, speed, n, row, chains.pulls[i])
         air = 0.5 * row[c.DENSITY] * row[c.ELEMENT] * row[c.AIR_RATE]
@@ -185,11 +158,11 @@ def fill_platform_force(run: ChainRun) -> float:
 @glue
 def power_of_given_wrench(run: ChainRun) -> float:
     """Power of the given wrench at the present velocities [W]."""
-    wx, wy, wz = spin(run.state, run.inertia)
+    wx, wy, wz = rigid_body.spin(run.state, run.inertia)
     hx, hy, hz = turned(run.state, run.handle[0], run.handle[1], run.handle[2])
-    there = run.state[VELOCITY] + (wy * hz - wz * hy)
-    beside = run.state[VELOCITY + 1] + (wz * hx - wx * hz)
-    above = run.state[VELOCITY + 2] + (wx * hy - wy * hx)
+    there = run.state[rigid_body.VELOCITY] + (wy * hz - wz * hy)
+    beside = run.state[rigid_body.VELOCITY + 1] + (wz * hx - wx * hz)
+    above = run.state[rigid_body.VELOCITY + 2] + (wx * hy - wy * hx)
     turning = run.given[3] * wx + run.given[4] * wy + run.given[5] * wz
     return run.given[0] * there + run.given[1] * beside + run.given[2] * above + turning
 
@@ -269,8 +242,8 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
     states, tensions, lengths, energies, _notes, points = records
     state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
     audit = drives.audit
-    kinetic, strain = kinetic_energy(state, run.inertia), 0.0
-    raised = run.inertia[MASS] * run.gravity * state[CENTER + 2]
+    kinetic, strain = rigid_body.kinetic_energy(state, run.inertia), 0.0
+    raised = run.inertia[rigid_body.MASS] * run.gravity * state[rigid_body.CENTER + 2]
     size, wildest, blamed = abs(raised), -1.0, 0
     for i in range(chains.counts.shape[0]):
         n, row = chains.counts[i], chains.table[i]
@@ -293,11 +266,11 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
     if not invented <= GROWTH * convertible + progress.ROUNDING * size:
         at[progress.FAILED], at[ENDED] = blamed + 1, GROWN
     if r < states.shape[0]:
-        turning = spin(state, run.inertia)
-        for k in range(MOMENTUM):
+        turning = rigid_body.spin(state, run.inertia)
+        for k in range(rigid_body.MOMENTUM):
             states[r, k] = state[k]
         for k in range(3):
-            states[r, MOMENTUM + k] = turning[k]
+            states[r, rigid_body.MOMENTUM + k] = turning[k]
         energies[r, progress.KINETIC], energies[r, progress.POTENTIAL] = kinetic, potential
         energies[r, progress.SUPPLIED], energies[r, progress.LOST] = audit[d.SUPPLIED], audit[d.LOST]
         for i in range(chains.counts.shape[0]):
@@ -311,23 +284,23 @@ def _split_step(run: ChainRun, now: float) -> None:
     """One step that starts at `now`. The stored forces belong to the state before the step, then to the new state."""
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
     drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
-    kick_body(run.state, run.inertia, run.force, half)
+    rigid_body.kick_body(run.state, run.inertia, run.force, half)
     kick_chains(run, half, True)
-    kick_winches(drives, rows, run.targets, half, True)
-    store_step_start(drives, rows)
-    drift_body(run.state, h)
-    free_turn(run.state, run.inertia, h)
-    turn_winches(drives, run.cables, rows, run.gravity, h)
+    d.kick_winches(drives, rows, run.targets, half, True)
+    d.store_step_start(drives, rows)
+    rigid_body.drift_body(run.state, h)
+    rigid_body.free_turn(run.state, run.inertia, h)
+    d.turn_winches(drives, run.cables, rows, run.gravity, h)
     follow_time_tables(run, now + h, -progress.MOMENT * h)
     for i in range(rows.shape[1]):
         row = chains.table[i]
         before = row[c.REST] + (drives.now[d.BEFORE, i] - rows[g.LENGTH, i])
         c.drift_nodes(chains.place[i], chains.speed[i], chains.counts[i], row, before, h)
     drives.audit[d.LOST] += h * fill_platform_force(run)
-    add_winch_energy(drives, run.cables, rows, h)
-    kick_body(run.state, run.inertia, run.force, half)
+    d.add_winch_energy(drives, run.cables, rows, h)
+    rigid_body.kick_body(run.state, run.inertia, run.force, half)
     kick_chains(run, half, False)
-    kick_winches(drives, rows, run.targets, half, False)
+    d.kick_winches(drives, rows, run.targets, half, False)
     drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
 
 
@@ -393,10 +366,10 @@ def run_chains(
             follow_time_tables(run, time, progress.MOMENT * step)  # rates may jump here
             fill_platform_force(run)
         if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
-            close_loops(drives, run.targets, run.target_rates, stride * step)
+            d.close_loops(drives, run.targets, run.target_rates, stride * step)
         _split_step(run, time)
         at[progress.STEPS] += 1
-        filter_tensions(drives, filtering)
+        d.filter_tensions(drives, filtering)
         _change_node_counts(run)
         progress.note_events(
             drives, rows, run.cables, at, audit[d.BEGIN] + at[progress.STEPS] * step, gravity, records[4]

@@ -88,8 +88,7 @@ def _fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> N
     for i in range(STAGES):
         for a in range(d):
             row = system[i * d + a]
-            for j in range(n):
-                row[j] = 0.0
+            row[:n] = 0.0
             for b in range(d):
                 row[n + b] = 1.0 if a == b else 0.0
                 total = 0.0 * mu

@@ -14,6 +14,7 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import progress
 from sagline.kernels.dynamics.chain import wind_across
 from sagline.kernels.dynamics.drives import Drives, keep_set_points
+from sagline.kernels.dynamics.progress import Courses, Kept
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, VELOCITY, power_of, spin
 from sagline.kernels.forward.platform import unbalance
 from sagline.kernels.jit import glue, kernel
@@ -29,10 +30,6 @@ ModelTerms = tuple[int, float, float, float, bool | None]
 Rules = tuple[int, int, int, int, int]  # integrator, winches, remembered, damping and loads, steps per control period
 Numbers = tuple[float, float, float, float]  # step [s], loss_time [s], air damping [N s/m^2], weight of a new reading
 Robot = tuple[Array, Array, Array, Array]  # cables, body, inertia, freedom
-Courses = tuple[
-    progress.CubicTableArrays, progress.CubicTableArrays, progress.CubicTableArrays
-]  # of lengths, wrenches, and wind velocity
-Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives, layers, audit, counters
 Records = tuple[Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes
 
 
@@ -84,11 +81,7 @@ def massless_run_of(
     wide, memory = block(memory, 4, rows.shape[1])
     both, memory = block(memory, 2, courses[0][1].shape[1])
     rotation, memory = block(memory, 3, 3)
-    lengths, wrenches, winds = (
-        progress.CubicTable(*courses[0]),
-        progress.CubicTable(*courses[1]),
-        progress.CubicTable(*courses[2]),
-    )
+    lengths, wrenches, winds = progress.time_tables(courses)
     drives = Drives(kind, remembered > 0, data, now, layers, audit)
     return MasslessRun(
         Model(*model), work, step, (loss_time, air), cables, body, inertia, freedom, drives, lengths, wrenches, winds,
@@ -178,8 +171,7 @@ def damp_cables(
     parts of the tensions are filled; wrench: filled.
     """
     lost = 0.0
-    for k in range(6):
-        wrench[k] = 0.0
+    wrench[:] = 0.0
     vx, vy, vz = turning[0], turning[1], turning[2]
     wx, wy, wz = turning[3], turning[4], turning[5]
     for i in range(cables.shape[0]):

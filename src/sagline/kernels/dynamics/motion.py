@@ -12,45 +12,8 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics import progress
-from sagline.kernels.dynamics.drives import (
-    add_winch_energy,
-    close_loops,
-    filter_tensions,
-    kick_winches,
-    store_step_start,
-    turn_winches,
-)
-from sagline.kernels.dynamics.massless import (
-    DAMPED,
-    SPLITTING,
-    Courses,
-    Kept,
-    MasslessRun,
-    ModelTerms,
-    Numbers,
-    Records,
-    Robot,
-    Rules,
-    add_powers,
-    cable_gravity,
-    fill_damping,
-    fill_forces,
-    fill_set_points,
-    massless_run_of,
-)
-from sagline.kernels.dynamics.rigid_body import (
-    CENTER,
-    MOMENTUM,
-    STATE_COLUMNS,
-    TURN,
-    drift_body,
-    free_turn,
-    kick_body,
-    kinetic_energy,
-    rates_of,
-    spin,
-)
+from sagline.kernels.dynamics import massless, progress, rigid_body
+from sagline.kernels.dynamics.progress import Courses, Kept
 from sagline.kernels.forward.platform import platform_energy
 from sagline.kernels.jit import entry, glue, kernel
 
@@ -59,13 +22,13 @@ GROWTH = 0.1
 
 
 @kernel
-def record_step(run: MasslessRun, records: Records) -> None:
+def record_step(run: massless.MasslessRun, records: massless.Records) -> None:
     """Record a step, and check that the energy does not increase by more than the supplied energy."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at
     audit, row = drives.audit, at[progress.RECORDS]
     stored, size = platform_energy(run.model, run.cables, run.body, run.none, state, run.rotation, rows)
-    kinetic, potential = kinetic_energy(state, run.inertia), stored + audit[d.ON_DRUMS]
+    kinetic, potential = rigid_body.kinetic_energy(state, run.inertia), stored + audit[d.ON_DRUMS]
     for i in range(rows.shape[1]):
         if drives.kind == d.DRUMS:
             kinetic += 0.5 * drives.data[d.INERTIA, i] * drives.now[d.SPEED, i] * drives.now[d.SPEED, i]
@@ -82,11 +45,11 @@ def record_step(run: MasslessRun, records: Records) -> None:
             if drives.now[d.AT_FRAME, i] > drives.now[d.AT_FRAME, at[progress.FAILED] - 1]:
                 at[progress.FAILED] = i + 1
     if row < states.shape[0]:
-        turning = spin(state, run.inertia)
-        for k in range(MOMENTUM):
-            states[row, CENTER + k] = state[CENTER + k]
+        turning = rigid_body.spin(state, run.inertia)
+        for k in range(rigid_body.MOMENTUM):
+            states[row, rigid_body.CENTER + k] = state[rigid_body.CENTER + k]
         for k in range(3):
-            states[row, MOMENTUM + k] = turning[k]
+            states[row, rigid_body.MOMENTUM + k] = turning[k]
         for i in range(rows.shape[1]):
             tensions[row, i] = drives.now[d.AT_FRAME, i]
             lengths[row, i] = rows[g.LENGTH, i]
@@ -96,12 +59,12 @@ def record_step(run: MasslessRun, records: Records) -> None:
 
 
 @glue
-def runge_kutta_step(run: MasslessRun, now: float) -> None:
+def runge_kutta_step(run: massless.MasslessRun, now: float) -> None:
     """One step of the classical Runge-Kutta method. The forces at its end replace the forces at its start."""
     h, drives, rows, state = run.step, run.drives, run.rows, run.state
     m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
     supplied, lost = 0.0, 0.0
-    for k in range(STATE_COLUMNS):
+    for k in range(rigid_body.STATE_COLUMNS):
         run.base[k] = state[k]
         run.total[k] = 0.0
     for i in range(m):
@@ -110,13 +73,13 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
     for stage in range(4):
         weight = 1.0 / 3.0 if stage == 1 or stage == 2 else 1.0 / 6.0
         ahead = 0.5 * h if stage < 2 else h
-        fill_damping(run)
+        massless.fill_damping(run)
         for k in range(6):
-            run.before[k] = run.gradient[k] + (run.damping[k] if run.work & DAMPED else 0.0)
-        rates_of(state, run.inertia, run.before, run.first)
+            run.before[k] = run.gradient[k] + (run.damping[k] if run.work & massless.DAMPED else 0.0)
+        rigid_body.rates_of(state, run.inertia, run.before, run.first)
         supplied += weight * drives.audit[d.GIVEN_POWER]
         lost += weight * drives.audit[d.LOST_POWER]
-        for k in range(STATE_COLUMNS):
+        for k in range(rigid_body.STATE_COLUMNS):
             run.total[k] += weight * run.first[k]
             state[k] = run.base[k] + (ahead * run.first[k] if stage < 3 else h * run.total[k])
         for i in range(m):
@@ -136,73 +99,72 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
         if stage == 3:
             scale = 0.0
             for k in range(4):
-                scale += state[TURN + k] * state[TURN + k]
+                scale += state[rigid_body.TURN + k] * state[rigid_body.TURN + k]
             for k in range(4):
-                state[TURN + k] /= math.sqrt(scale)
-        fill_forces(run, now + ahead)
+                state[rigid_body.TURN + k] /= math.sqrt(scale)
+        massless.fill_forces(run, now + ahead)
     drives.audit[d.SUPPLIED] += h * supplied
     drives.audit[d.LOST] += h * lost
-    fill_damping(run)
+    massless.fill_damping(run)
 
 
 @glue
-def splitting_step(run: MasslessRun, now: float) -> None:
+def splitting_step(run: massless.MasslessRun, now: float) -> None:
     """One step of the splitting from the time `now`. The forces at its end replace the forces at its start."""
     h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
-    fill_damping(run)
-    add_powers(drives, half)
-    kick_body(run.state, run.inertia, run.gradient, half)
-    if run.work & DAMPED:
-        kick_body(run.state, run.inertia, run.damping, half)
-    kick_winches(drives, rows, run.targets, half, True)
-    store_step_start(drives, rows)
-    drift_body(run.state, h)
-    free_turn(run.state, run.inertia, h)
-    turn_winches(drives, run.cables, rows, cable_gravity(run), h)
-    fill_forces(run, now + h)
-    add_winch_energy(drives, run.cables, rows, h)
-    kick_body(run.state, run.inertia, run.gradient, half)
-    if run.work & DAMPED:  # adjoint of the first kick, with one correction of the damping
-        fill_damping(run)
+    massless.fill_damping(run)
+    massless.add_powers(drives, half)
+    rigid_body.kick_body(run.state, run.inertia, run.gradient, half)
+    if run.work & massless.DAMPED:
+        rigid_body.kick_body(run.state, run.inertia, run.damping, half)
+    d.kick_winches(drives, rows, run.targets, half, True)
+    d.store_step_start(drives, rows)
+    rigid_body.drift_body(run.state, h)
+    rigid_body.free_turn(run.state, run.inertia, h)
+    d.turn_winches(drives, run.cables, rows, massless.cable_gravity(run), h)
+    massless.fill_forces(run, now + h)
+    d.add_winch_energy(drives, run.cables, rows, h)
+    rigid_body.kick_body(run.state, run.inertia, run.gradient, half)
+    if run.work & massless.DAMPED:  # adjoint of the first kick, with one correction of the damping
+        massless.fill_damping(run)
         for k in range(6):
             run.before[k] = run.damping[k]
-        kick_body(run.state, run.inertia, run.damping, half)
-        fill_damping(run)
-        kick_body(run.state, run.inertia, run.before, -half)
-        kick_body(run.state, run.inertia, run.damping, half)
-    kick_winches(drives, rows, run.targets, half, False)
-    fill_damping(run)
-    add_powers(drives, half)
+        rigid_body.kick_body(run.state, run.inertia, run.damping, half)
+        massless.fill_damping(run)
+        rigid_body.kick_body(run.state, run.inertia, run.before, -half)
+        rigid_body.kick_body(run.state, run.inertia, run.damping, half)
+    d.kick_winches(drives, rows, run.targets, half, False)
+    massless.fill_damping(run)
+    massless.add_powers(drives, half)
 
 
 @glue
-def _start_run(run: MasslessRun, records: Records, room: Array) -> None:
+def _start_run(run: massless.MasslessRun, records: massless.Records, room: Array) -> None:
     """Prepare the start of a run, or the continuation of a run after an event."""
     at, now = run.at, run.drives.now
     time = run.drives.audit[d.BEGIN] + at[progress.STEPS] * run.step
     at[progress.READY] = 1
-    for k in range(room.shape[0]):
-        room[k] = 0.0
-    fill_forces(run, time)
-    fill_set_points(run, time, progress.MOMENT * run.step)
-    fill_damping(run)
+    room[:] = 0.0
+    massless.fill_forces(run, time)
+    massless.fill_set_points(run, time, progress.MOMENT * run.step)
+    massless.fill_damping(run)
     if at[progress.STEPS] == 0:
         for i in range(now.shape[1]):
             now[d.FILTERED, i] = now[d.AT_FRAME, i]
-    progress.note_events(run.drives, run.rows, run.cables, at, time, cable_gravity(run), records[4])
+    progress.note_events(run.drives, run.rows, run.cables, at, time, massless.cable_gravity(run), records[4])
     record_step(run, records)
 
 
 @entry
 def run_massless(
-    model: ModelTerms,
-    rules: Rules,
-    numbers: Numbers,
-    robot: Robot,
+    model: massless.ModelTerms,
+    rules: massless.Rules,
+    numbers: massless.Numbers,
+    robot: massless.Robot,
     data: Array,
     courses: Courses,
     kept: Kept,
-    records: Records,
+    records: massless.Records,
     steps: int,
     every: int,
 ) -> None:
@@ -227,7 +189,7 @@ def run_massless(
     """
     integrator, kind, _remembered, _work, stride = rules
     step, filtering = numbers[0], numbers[3]
-    moving = massless_run_of(model, rules, numbers, robot, data, courses, kept)
+    moving = massless.massless_run_of(model, rules, numbers, robot, data, courses, kept)
     drives, rows, at, audit = moving.drives, moving.rows, moving.at, kept[4]
     if at[progress.READY] == 0:
         _start_run(moving, records, kept[6])
@@ -240,22 +202,22 @@ def run_massless(
             or at[progress.RENEWED] > 0
         ):
             at[progress.RENEWED] = 0
-            fill_set_points(moving, time, progress.MOMENT * step)  # rates may jump here
+            massless.fill_set_points(moving, time, progress.MOMENT * step)  # rates may jump here
         if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
-            close_loops(drives, moving.targets, moving.target_rates, stride * step)
-        if integrator == SPLITTING:
+            d.close_loops(drives, moving.targets, moving.target_rates, stride * step)
+        if integrator == massless.SPLITTING:
             splitting_step(moving, time)
         else:
             runge_kutta_step(moving, time)
         at[progress.STEPS] += 1
-        filter_tensions(drives, filtering)
+        d.filter_tensions(drives, filtering)
         progress.note_events(
             drives,
             rows,
             moving.cables,
             at,
             audit[d.BEGIN] + at[progress.STEPS] * step,
-            cable_gravity(moving),
+            massless.cable_gravity(moving),
             records[4],
         )
         if every > 0 and at[progress.STEPS] % every == 0:

@@ -61,6 +61,16 @@ def interval_ends(course: CubicTable, at: int, moment: float) -> bool:
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]
 
 
+Courses = tuple[CubicTableArrays, CubicTableArrays, CubicTableArrays]  # of lengths, wrenches, and wind velocity
+Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives, layers, audit, counters
+
+
+@glue
+def time_tables(courses: Courses) -> tuple[CubicTable, CubicTable, CubicTable]:
+    """Time tables of lengths, wrenches and wind velocity."""
+    return CubicTable(*courses[0]), CubicTable(*courses[1]), CubicTable(*courses[2])
+
+
 # counters of a run, which each call updates
 STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED = range(9)
 COUNTERS = 9

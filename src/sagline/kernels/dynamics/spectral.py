@@ -147,8 +147,7 @@ def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None
     for i in range(degree + 1):
         apart = place - lobatto.nodes[degree, i]
         if abs(apart) < 1e-14:
-            for j in range(degree + 1):
-                values[j] = 0.0
+            values[: degree + 1] = 0.0
             values[i] = total = 1.0
             break
         values[i] = sign * math.sqrt(lobatto.weights[degree, i]) / apart
@@ -177,8 +176,7 @@ def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -
     """Fill static shapes xx, xz, zx, zz, yy times roots of masses, (nodes, 5), and masses of these motions, (4,)."""
     end = points[count - 1]
     determinant = end[2] * end[4] - end[3] * end[3]
-    for k in range(4):
-        still[k] = 0.0
+    still[:] = 0.0
     for q in range(count):
         mass, xx, xz, zz = points[q, 1], points[q, 2], points[q, 3], points[q, 4]
         root = math.sqrt(mass)
@@ -285,8 +283,7 @@ def spectral_matrices(
             _constrain_unknown(plane[i], unknown, stiff)
         for unknown in range(count - 1, normal.shape[1]):
             _constrain_unknown(normal[i], unknown, stiff)
-        for q in range(count, points.shape[1]):
-            points[i, q, 0] = math.nan
+        points[i, count : points.shape[1], 0] = math.nan
 
 
 @entry

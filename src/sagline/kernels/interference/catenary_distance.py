@@ -14,25 +14,7 @@ import math
 import numpy as np
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.interference.shapes import (
-    AXES,
-    BOX,
-    FIRST,
-    HALF,
-    KIND,
-    LAST,
-    PLACE,
-    RADIUS,
-    between_segments,
-    bulge,
-    level_point,
-    nearest_in_box,
-    nearest_of_curves,
-    nearest_to_box,
-    point,
-    square_between,
-    to_box,
-)
+from sagline.kernels.interference import shapes
 from sagline.kernels.jit import entry, kernel
 
 # Columns of a piece: ends of its chord (six), bulge, range as shares of the cable, index of the first of its two parts
@@ -62,7 +44,7 @@ def work_arrays_for_pieces() -> tuple[Array, Array]:
 def _set_piece(piece: Array, row: Array, first: float, last: float) -> None:
     """Set range and bulge of `piece`, which has the ends `first` and `last`."""
     dx, dy, dz = piece[3] - piece[0], piece[4] - piece[1], piece[5] - piece[2]
-    piece[BULGE] = bulge(row, first, last, dx * dx + dy * dy + dz * dz)
+    piece[BULGE] = shapes.bulge(row, first, last, dx * dx + dy * dy + dz * dz)
     piece[BEGIN] = first
     piece[END] = last
     piece[PARTS] = 0.0
@@ -71,9 +53,9 @@ def _set_piece(piece: Array, row: Array, first: float, last: float) -> None:
 @kernel
 def _whole_piece(piece: Array, row: Array) -> None:
     """Store the whole measured part of a cable as the first piece."""
-    piece[0], piece[1], piece[2] = point(row, row[FIRST])
-    piece[3], piece[4], piece[5] = point(row, row[LAST])
-    _set_piece(piece, row, row[FIRST], row[LAST])
+    piece[0], piece[1], piece[2] = shapes.point(row, row[shapes.FIRST])
+    piece[3], piece[4], piece[5] = shapes.point(row, row[shapes.LAST])
+    _set_piece(piece, row, row[shapes.FIRST], row[shapes.LAST])
 
 
 @kernel
@@ -83,10 +65,10 @@ def _split_piece(pieces: Array, index: int, row: Array) -> None:
     piece, one, other = pieces[index], pieces[count], pieces[count + 1]
     middle = 0.5 * (piece[BEGIN] + piece[END])
     width = piece[END] - piece[BEGIN]
-    bottom = level_point(row)
+    bottom = shapes.level_point(row)
     if piece[BEGIN] + 1e-3 * width < bottom < piece[END] - 1e-3 * width:
         middle = bottom
-    x, y, z = point(row, middle)
+    x, y, z = shapes.point(row, middle)
     for k in range(3):
         one[k] = piece[k]
         other[3 + k] = piece[3 + k]
@@ -103,10 +85,10 @@ def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -
     """Distance of the chords of the pieces `i` and `j` [m], lower bound for the pieces, shares of nearest points."""
     one = pieces[i]
     if to_a_box:
-        square, low, s = to_box(one, box)
+        square, low, s = shapes.to_box(one, box)
         return math.sqrt(square), math.sqrt(low) - one[BULGE], one[BEGIN] + s * (one[END] - one[BEGIN]), 0.0
     other = pieces[j]
-    square, low, s, t = between_segments(one, other)
+    square, low, s, t = shapes.between_segments(one, other)
     return (
         math.sqrt(square),
         math.sqrt(low) - one[BULGE] - other[BULGE],
@@ -119,9 +101,9 @@ def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -
 def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
     """Local minimum of the distance of a pair [m], and its two shares. The search starts at the shares `s` and `t`."""
     if to_a_box:
-        square, s = nearest_to_box(one, other, s)
+        square, s = shapes.nearest_to_box(one, other, s)
     else:
-        square, s, t = nearest_of_curves(one, other, s, t)
+        square, s, t = shapes.nearest_of_curves(one, other, s, t)
     return math.sqrt(square), s, t
 
 
@@ -129,9 +111,9 @@ def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: flo
 def _square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> float:
     """Squared distance of two points of a pair [m^2]."""
     if not to_a_box:
-        return square_between(one, other, s, t)
-    x, y, z = point(one, s)
-    bx, by, bz = nearest_in_box(other, x, y, z)
+        return shapes.square_between(one, other, s, t)
+    x, y, z = shapes.point(one, s)
+    bx, by, bz = shapes.nearest_in_box(other, x, y, z)
     return (x - bx) * (x - bx) + (y - by) * (y - by) + (z - bz) * (z - bz)
 
 
@@ -143,7 +125,7 @@ def _least_of_pair(
 
     For distances above `enough` the search ends early, with a lower bound of at least `enough` - precision.
     """
-    to_a_box = other[KIND] == BOX
+    to_a_box = other[shapes.KIND] == shapes.BOX
     distance, low, s, t = _chord_distance(pieces, i, j, other, to_a_box)
     if math.isnan(distance):
         return math.nan, math.nan, math.nan, math.nan
@@ -193,12 +175,12 @@ def _least_of_pair(
 def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
     """Fill `edge` with one of the four edges of `box` along `axis`."""
     for k in range(3):
-        middle = box[PLACE + k]
-        along = box[AXES + 3 * k + axis] * box[HALF + axis]
+        middle = box[shapes.PLACE + k]
+        along = box[shapes.AXES + 3 * k + axis] * box[shapes.HALF + axis]
         for side in range(2):
             other = (axis + 1 + side) % 3
             sign = 1.0 if (corner >> side) & 1 else -1.0
-            middle += sign * box[AXES + 3 * k + other] * box[HALF + other]
+            middle += sign * box[shapes.AXES + 3 * k + other] * box[shapes.HALF + other]
         edge[k] = middle - along
         edge[3 + k] = middle + along
 
@@ -209,12 +191,12 @@ def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: f
     for axis in range(3):
         for corner in range(4):
             _edge_of(box, axis, corner, edge)
-            square, _, t = to_box(edge, other)
+            square, _, t = shapes.to_box(edge, other)
             if math.sqrt(square) < best:
                 best = math.sqrt(square)
                 for k in range(3):
                     nearest[0, k] = edge[k] + t * (edge[3 + k] - edge[k])
-                nearest[1, 0], nearest[1, 1], nearest[1, 2] = nearest_in_box(
+                nearest[1, 0], nearest[1, 1], nearest[1, 2] = shapes.nearest_in_box(
                     other, nearest[0, 0], nearest[0, 1], nearest[0, 2]
                 )
     return best
@@ -234,12 +216,12 @@ def _least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> fl
 @kernel
 def _set_nearest(one: Array, other: Array, s: float, t: float, nearest: Array) -> None:
     """Set the nearest points of a pair from their shares of the cable lengths."""
-    x, y, z = point(one, s)
+    x, y, z = shapes.point(one, s)
     nearest[0, 0], nearest[0, 1], nearest[0, 2] = x, y, z
-    if other[KIND] == BOX:
-        nearest[1, 0], nearest[1, 1], nearest[1, 2] = nearest_in_box(other, x, y, z)
+    if other[shapes.KIND] == shapes.BOX:
+        nearest[1, 0], nearest[1, 1], nearest[1, 2] = shapes.nearest_in_box(other, x, y, z)
     else:
-        nearest[1, 0], nearest[1, 1], nearest[1, 2] = point(other, t)
+        nearest[1, 0], nearest[1, 1], nearest[1, 2] = shapes.point(other, t)
 
 
 @entry
@@ -274,23 +256,22 @@ def least_distances(
     poses, several = moving.shape[0], moving.shape[1]
     count = several + still.shape[0]
     for k in range(still.shape[0]):
-        if still[k, KIND] != BOX:
+        if still[k, shapes.KIND] != shapes.BOX:
             _whole_piece(pieces[several + k], still[k])
     for n in range(poses):
         pieces[COUNTER, PARTS] = count
         for k in range(several):
-            if moving[n, k, KIND] != BOX:
+            if moving[n, k, shapes.KIND] != shapes.BOX:
                 _whole_piece(pieces[k], moving[n, k])
-        for k in range(still.shape[0]):
-            pieces[several + k, PARTS] = 0.0
+        pieces[several:count, PARTS] = 0.0
         least = FAR
         for p in range(pairs.shape[0]):
             i, j = pairs[p, 0], pairs[p, 1]
             one = moving[n, i] if i < several else still[i - several]
             other = moving[n, j] if j < several else still[j - several]
-            radii = one[RADIUS] + other[RADIUS]
+            radii = one[shapes.RADIUS] + other[shapes.RADIUS]
             nearest = nearest_out[n, p]
-            if one[KIND] == BOX:
+            if one[shapes.KIND] == shapes.BOX:
                 distance = _least_of_boxes(one, other, pieces[COUNTER], nearest)
                 distance_out[n, p] = distance - radii
                 low_out[n, p] = distance * (1.0 - ROUNDING) - radii
@@ -315,6 +296,6 @@ def cut_piece(row: Array, ranges: Array, pieces_out: Array) -> None:
     """
     for k in range(ranges.shape[0]):
         piece, first, last = pieces_out[k], ranges[k, 0], ranges[k, 1]
-        piece[0], piece[1], piece[2] = point(row, first)
-        piece[3], piece[4], piece[5] = point(row, last)
+        piece[0], piece[1], piece[2] = shapes.point(row, first)
+        piece[3], piece[4], piece[5] = shapes.point(row, last)
         _set_piece(piece, row, first, last)

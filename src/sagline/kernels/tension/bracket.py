@@ -16,15 +16,7 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.algebra.factors import factorize, orthogonal_factor, pseudo_inverse
-from sagline.kernels.cable.sag_forces import (
-    Curves,
-    Section,
-    find_extrema,
-    most_along,
-    sag_force_at,
-    sag_force_range,
-    slopes_at,
-)
+from sagline.kernels.cable import sag_forces
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
@@ -42,9 +34,9 @@ RANGE_ROWS = 4
 
 
 @glue
-def _section_of(range_: Array, i: int) -> Section:
+def _section_of(range_: Array, i: int) -> sag_forces.Section:
     """The tensions of cable `i` in `range_`."""
-    return Section(range_[LEAST, i], range_[LARGEST, i], range_[AT_LEAST, i], range_[AT_LARGEST, i])
+    return sag_forces.Section(range_[LEAST, i], range_[LARGEST, i], range_[AT_LEAST, i], range_[AT_LARGEST, i])
 
 
 @formula
@@ -57,7 +49,7 @@ def component_along(columns: Array, direction: Array, i: int) -> float:
 
 
 @kernel
-def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
+def _spare_capacity(curves: sag_forces.Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
     """Capacity of the cables along `direction`, minus the demand [N]. A negative value proves infeasibility.
 
     The value is an upper bound that includes rounding errors. tops: filled with the largest contribution of each cable,
@@ -70,14 +62,16 @@ def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Ar
         size += abs(direction[k] * demand.right[k])
     for i in range(tops.size):
         a, b = component_along(demand.matrix, direction, i), component_along(demand.hanging, direction, i)
-        tops[i] = most_along(curves, i, _section_of(range_, i), a, b)
+        tops[i] = sag_forces.most_along(curves, i, _section_of(range_, i), a, b)
         spare += tops[i]
         size += abs(a) * range_[LARGEST, i] + abs(b) * max(abs(range_[AT_LEAST, i]), abs(range_[AT_LARGEST, i]))
     return spare + CERTAIN * size
 
 
 @kernel
-def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
+def _narrow_range(
+    curves: sag_forces.Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array
+) -> bool:
     """Remove from `range_` the tensions at which a cable is below its largest contribution by more than `spare`.
 
     Returns False if the range becomes empty.
@@ -86,24 +80,24 @@ def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Arra
         return True
     for i in range(tops.size):
         a, b = component_along(demand.matrix, direction, i), component_along(demand.hanging, direction, i)
-        least, most = sag_force_range(curves, i, _section_of(range_, i))
+        least, most = sag_forces.sag_force_range(curves, i, _section_of(range_, i))
         needed = tops[i] - spare + min(b * least, b * most)
         if a > 0.0 and needed / a > range_[LEAST, i]:
             if needed / a > range_[LARGEST, i]:
                 return False
             range_[LEAST, i] = needed / a
-            range_[AT_LEAST, i] = sag_force_at(curves, i, range_[LEAST, i])
+            range_[AT_LEAST, i] = sag_forces.sag_force_at(curves, i, range_[LEAST, i])
         elif a < 0.0 and needed / a < range_[LARGEST, i]:
             if needed / a < range_[LEAST, i]:
                 return False
             range_[LARGEST, i] = needed / a
-            range_[AT_LARGEST, i] = sag_force_at(curves, i, range_[LARGEST, i])
+            range_[AT_LARGEST, i] = sag_forces.sag_force_at(curves, i, range_[LARGEST, i])
     return True
 
 
 @kernel
 def _narrow_free(
-    curves: Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
+    curves: sag_forces.Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
 ) -> bool:
     """Narrow a range along directions in which, of the cables that are not at a limit, only one contributes.
 
@@ -118,7 +112,7 @@ def _narrow_free(
     rows, memory = block(memory, 2 * count + n + 2, n)
     diagonals, memory = block(memory, 2, count)
     reduced, inverse = rows[:count], rows[count : 2 * count]
-    slopes_at(curves, change.tau, tops, curves.cables.slackness)
+    sag_forces.slopes_at(curves, change.tau, tops, curves.cables.slackness)
     count = 0
     for i in range(m):
         if range_[LEAST, i] < change.tau[i] < range_[LARGEST, i]:
@@ -141,13 +135,13 @@ def _narrow_free(
 
 
 @glue
-def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
+def _least_certain(curves: sag_forces.Curves, range_: Array) -> tuple[int, float]:
     """Cable with the most uncertain sag force in `range_`, and sum of the uncertainties of all sag forces [N]."""
     worst = -1
     largest = 0.0
     total = 0.0
     for i in range(range_.shape[1]):
-        least, most = sag_force_range(curves, i, _section_of(range_, i))
+        least, most = sag_forces.sag_force_range(curves, i, _section_of(range_, i))
         total += most - least
         if most - least > largest:
             worst, largest = i, most - least
@@ -155,14 +149,14 @@ def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
 
 
 @glue
-def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
+def _split_range(curves: sag_forces.Curves, waiting: Array, top: int, i: int, tau: float) -> None:
     """Split the tension range of cable `i` in two. The half with the present tension is examined next."""
     for row in range(RANGE_ROWS):
         for j in range(waiting.shape[2]):
             waiting[top + 1, row, j] = waiting[top, row, j]
     low, high = waiting[top, LEAST, i], waiting[top, LARGEST, i]
     middle = math.sqrt(low * high) if low > 0.0 else 0.5 * high
-    sag_force = sag_force_at(curves, i, middle)
+    sag_force = sag_forces.sag_force_at(curves, i, middle)
     lower, upper = (top + 1, top) if tau <= middle else (top, top + 1)
     waiting[lower, LARGEST, i] = middle
     waiting[lower, AT_LARGEST, i] = sag_force
@@ -171,7 +165,7 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
 
 
 @glue
-def _first_range(curves: Curves, size: float, range_: Array) -> None:
+def _first_range(curves: sag_forces.Curves, size: float, range_: Array) -> None:
     """Fill the first range: all admissible tensions. Its upper end is always finite, also without a limit."""
     cables = curves.cables
     for i in range(cables.low.size):
@@ -180,13 +174,13 @@ def _first_range(curves: Curves, size: float, range_: Array) -> None:
             high = max(low, PLENTY * size)
         range_[LEAST, i] = low
         range_[LARGEST, i] = high
-        range_[AT_LEAST, i] = sag_force_at(curves, i, low)
-        range_[AT_LARGEST, i] = sag_force_at(curves, i, high)
+        range_[AT_LEAST, i] = sag_forces.sag_force_at(curves, i, low)
+        range_[AT_LARGEST, i] = sag_forces.sag_force_at(curves, i, high)
 
 
 @glue
 def _approach_demand(
-    curves: Curves, demand: Demand, range_: Array, trial: TensionChange, memory: Memory
+    curves: sag_forces.Curves, demand: Demand, range_: Array, trial: TensionChange, memory: Memory
 ) -> tuple[float, bool]:
     """Compute the tensions in `range_` whose wrench is closest to `demand`.
 
@@ -205,14 +199,13 @@ def _approach_demand(
     moments = Demand(demand.matrix[first:], demand.hanging[first:], demand.right[first:], n - first, demand.size)
     part = TensionChange(trial.tau, trial.sag_force, trial.residual[first:], trial.direction[first:])
     least_change(curves, moments, range_, part, memory)
-    for k in range(first):
-        trial.direction[k] = 0.0
+    trial.direction[:first] = 0.0
     return math.inf, False
 
 
 @glue
 def decide_feasibility(
-    curves: Curves, demand: Demand, nodes: int, change: TensionChange, memory: Memory
+    curves: sag_forces.Curves, demand: Demand, nodes: int, change: TensionChange, memory: Memory
 ) -> tuple[int, float, float, bool]:
     """Feasibility of `demand` with tensions within the cables' limits.
 
@@ -229,7 +222,7 @@ def decide_feasibility(
     tau, rest = block(rest, 3, max(m, n))
     trial = TensionChange(tau[0, :m], sag_force, tau[1, :n], tau[2, :n])
     _first_range(curves, demand.size, ranges[0])
-    find_extrema(curves, ranges[0, LEAST], ranges[0, LARGEST], rest)
+    sag_forces.find_extrema(curves, ranges[0, LEAST], ranges[0, LARGEST], rest)
     for i in range(m):
         trial.tau[i] = change.tau[i]
     enough = math.inf

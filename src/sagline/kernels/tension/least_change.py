@@ -11,16 +11,8 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
+from sagline.kernels.algebra import factors
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, inward, largest_bound
-from sagline.kernels.algebra.factors import (
-    factor_positive,
-    factorize,
-    minimum_norm,
-    orthogonal_factor,
-    pseudo_inverse,
-    solve_lower,
-    solve_upper,
-)
 from sagline.kernels.algebra.programs import ActiveSet, nearest_point, new_active_set
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at, slopes_at
 from sagline.kernels.jit import formula, glue, kernel
@@ -140,10 +132,10 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
         step.bend[i] = min(max(along * step.bend[i], 0.0), STIFFEST) + STEADINESS
         for k in range(hard):
             step.reduced[k, i] = step.matrix[soft + k, i]
-    if not factorize(step.reduced, step.diagonals):
+    if not factors.factorize(step.reduced, step.diagonals):
         return False
-    orthogonal_factor(step.reduced, step.diagonals, step.q)
-    pseudo_inverse(step.reduced, step.diagonals, step.q, step.inverse)
+    factors.orthogonal_factor(step.reduced, step.diagonals, step.q)
+    factors.pseudo_inverse(step.reduced, step.diagonals, step.q, step.inverse)
     for k in range(soft):
         for j in range(d):
             step.soft[k, j] = 0.0
@@ -156,7 +148,7 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
                 step.normal[j, b] += step.soft[k, j] * step.soft[k, b]
             for i in range(m):
                 step.normal[j, b] += step.q[i, hard + j] * step.bend[i] * step.q[i, hard + b]
-    return factor_positive(step.normal, 0.0, step.normal)
+    return factors.factor_positive(step.normal, 0.0, step.normal)
 
 
 @glue
@@ -167,7 +159,7 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
     hard = n - soft
     d = m - hard
     base, z = step.bounds[START], step.unknowns[0]
-    minimum_norm(step.inverse, change.residual[soft:], base)
+    factors.minimum_norm(step.inverse, change.residual[soft:], base)
     for j in range(d):
         z[j] = 0.0
         step.unknowns[1, j] = 0.0
@@ -180,8 +172,8 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
     for j in range(d):
         for i in range(m):
             z[j] -= step.q[i, hard + j] * step.bend[i] * base[i]
-    solve_lower(step.normal, z)
-    solve_upper(step.normal, z)
+    factors.solve_lower(step.normal, z)
+    factors.solve_upper(step.normal, z)
     for i in range(m):
         base[i] += change.tau[i]
         for j in range(d):
@@ -291,8 +283,7 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionC
     soft = demand.soft
     step, _ = _new_tangents(memory, n, m, n - soft)
     _fill_residual(curves, demand, change.tau, change.sag_force, change.residual)
-    for k in range(n):
-        step.multipliers[k] = 0.0
+    step.multipliers[:] = 0.0
     for _ in range(NEWTON_STEPS):
         if not _set_tangents(curves, demand, change.tau, step.multipliers, step):
             return math.nan

@@ -197,8 +197,7 @@ def share_lowest_maximum(
             wide[row, i] = bounds[row, i]
         # largest tension minus tension of cable i >= 0
         wide[START, m + i], wide[LOW, m + i], wide[HIGH, m + i] = -bounds[START, i] - offset[i], 0.0, math.inf
-    for k in range(r):
-        cost[k] = 0.0
+    cost[:r] = 0.0
     cost[r] = 1.0
     largest = largest_bound(bounds)
     outcome = lowest_point(rows, wide, cost, TOLERANCE * largest, basis, found)
@@ -283,10 +282,8 @@ def _newton_target(
     scale = 0.0
     for i in range(m):
         scale = max(scale, abs(_tension_at(bounds, null, point, i) + offset[i]))
-    for k in range(r):
-        slope[k] = 0.0
-        for j in range(k + 1):
-            curve[k, j] = 0.0
+    slope[:] = 0.0
+    curve[:] = 0.0
     for i in range(m):
         size = abs(_tension_at(bounds, null, point, i) + offset[i]) / scale
         power = max(size, 1e-9) ** (p - 2.0)

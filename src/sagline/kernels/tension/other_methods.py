@@ -15,17 +15,7 @@ from sagline.kernels.algebra.factors import factor_positive, normalize_row, orth
 from sagline.kernels.algebra.programs import LP_SOLVED, lowest_point
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.tension.nearest import (
-    Distribution,
-    ReferencePoint,
-    program_status,
-    satisfies_limits,
-    set_point,
-    share_by_norm,
-    share_lowest_maximum,
-    share_lowest_sum,
-    share_nearest,
-)
+from sagline.kernels.tension import nearest
 from sagline.kernels.tension.on_polygon import centroid, distribute_on_polygon, feasible_corners
 from sagline.kernels.tension.polygon import WorkArrays
 
@@ -92,15 +82,14 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
         halves[START, i], halves[LOW, i], halves[HIGH, i] = bounds[START, i], bounds[LOW, i], math.inf
         halves[START, m + i], halves[LOW, m + i] = -bounds[START, i], -bounds[HIGH, i]
         halves[HIGH, m + i] = math.inf
-    for k in range(r):
-        cost[k] = 0.0
+    cost[:r] = 0.0
     cost[r] = -1.0
     slack = TOLERANCE * largest_bound(bounds)
     work.basis.labels[0] = -1
     outcome = lowest_point(rows, halves, cost, slack, work.basis, found)
     for k in range(r):
         point[k] = found[k]
-    return codes.POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else program_status(outcome)
+    return codes.POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else nearest.program_status(outcome)
 
 
 @kernel
@@ -118,10 +107,8 @@ def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -
     slope, step = vectors[0], vectors[1]
     largest = largest_bound(bounds)
     for _ in range(NEWTON_STEPS):
-        for k in range(r):
-            slope[k] = 0.0
-            for j in range(k + 1):
-                curve[k, j] = 0.0
+        slope[:] = 0.0
+        curve[:] = 0.0
         for i in range(m):
             tension = bounds[START, i]
             for k in range(r):
@@ -172,7 +159,7 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
     slack = TOLERANCE * largest_bound(bounds)
     for i in range(m):
         tension[i] = bounds[START, i]
-    if method == codes.PUNCTURE and satisfies_limits(bounds, tension, slack):
+    if method == codes.PUNCTURE and nearest.satisfies_limits(bounds, tension, slack):
         return True
     for k in range(r):
         share = 0.0
@@ -181,7 +168,7 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
         for i in range(m):
             tension[i] += null[k, i] * share
     if method == codes.CLOSED_FORM:
-        return satisfies_limits(bounds, tension, slack)
+        return nearest.satisfies_limits(bounds, tension, slack)
     if not _hold_violated(bounds, null, slack, memory, tension):
         return False
     if method == codes.PUNCTURE:
@@ -246,11 +233,11 @@ def _puncture(bounds: Array, tension: Array) -> None:
 
 @kernel
 def distribute_by_other_method(
-    distribution: Distribution,
+    distribution: nearest.Distribution,
     bounds: Array,
     offset: Array,
     null: Array,
-    near: ReferencePoint,
+    near: nearest.ReferencePoint,
     work: WorkArrays,
     tension: Array,
 ) -> int:
@@ -261,24 +248,24 @@ def distribute_by_other_method(
     method, parameter = distribution.method, distribution.parameter
     status = codes.POSE_SOLVED
     if null.shape[0] == 0:
-        set_point(bounds, null, near.reference, tension)
-        kept = satisfies_limits(bounds, tension, TOLERANCE * largest_bound(bounds))
+        nearest.set_point(bounds, null, near.reference, tension)
+        kept = nearest.satisfies_limits(bounds, tension, TOLERANCE * largest_bound(bounds))
         status = codes.POSE_SOLVED if kept else codes.POSE_INFEASIBLE
     elif codes.CLOSED_FORM <= method <= codes.PUNCTURE:
         if not share_near_middle(method, bounds, null, work.rest, tension):
-            status = share_nearest(bounds, null, near, tension)
+            status = nearest.share_nearest(bounds, null, near, tension)
             status = codes.POSE_NOT_COVERED if status == codes.POSE_SOLVED else status
     else:
         if method == codes.LOWEST_MAXIMUM:
-            status = share_lowest_maximum(bounds, offset, null, near, work.basis, work.rest)
+            status = nearest.share_lowest_maximum(bounds, offset, null, near, work.basis, work.rest)
         elif method == codes.LOWEST_SUM:
-            status = share_lowest_sum(bounds, null, near, work.basis, work.rest)
+            status = nearest.share_lowest_sum(bounds, null, near, work.basis, work.rest)
         elif method == codes.P_NORM:
-            status = share_by_norm(parameter, bounds, offset, null, near, work.known, work.rest)
+            status = nearest.share_by_norm(parameter, bounds, offset, null, near, work.known, work.rest)
         elif method == codes.ANALYTIC_CENTER:
             status = share_at_center(bounds, null, near.point, work)
         elif method == codes.CENTROID or method == codes.POLYGON_WALK:
             status = distribute_on_polygon(method, parameter, bounds, null, near, work)
         if status == codes.POSE_SOLVED:
-            set_point(bounds, null, near.point, tension)
+            nearest.set_point(bounds, null, near.point, tension)
     return status

@@ -214,8 +214,7 @@ def proves_outside(
         if attempt == 1:
             break
         push = vectors[1]
-        for k in range(n):
-            push[k] = 0.0
+        push[:] = 0.0
         for i in range(m):
             if abs(value[i]) < spread[i] + bend[i]:
                 goal = -bend[i] - value[i]

@@ -257,8 +257,7 @@ def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ran
     """Fill the derivatives of the wrench of tensions and sag forces with respect to each motion, (MOTIONS, 6)."""
     m = place.way.size
     for motion in range(MOTIONS):
-        for a in range(6):
-            slopes[motion, a] = 0.0
+        slopes[motion] = 0.0
         if motion >= 3 and box.turn == 0.0:
             continue
         columns = place.slopes[motion].reshape((6, m))

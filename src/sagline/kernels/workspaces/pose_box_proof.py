@@ -20,16 +20,8 @@ from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import place_cables
+from sagline.kernels.workspaces import box_tensions
 from sagline.kernels.workspaces.box_proofs import Precision, proves_inside, proves_outside
-from sagline.kernels.workspaces.box_tensions import (
-    Ranges,
-    center_tensions,
-    in_wrench_space,
-    new_centered,
-    search_limits,
-    set_ranges,
-    tighten,
-)
 from sagline.kernels.workspaces.pose_box import PoseRange, new_cables_in_box, set_cables_in_box
 from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_loads
 
@@ -81,12 +73,12 @@ def prove_boxes(
     model = model_at(model_terms, body)
     cables, rest = new_cables(Memory(*memory), m, False)
     place, rest = new_cables_in_box(rest, m, n)
-    centered, rest = new_centered(rest, m, n)
+    centered, rest = box_tensions.new_centered(rest, m, n)
     curves, rest = new_curves(model, cables, statuses, rest)
     rows, rest = block(rest, g.GEOMETRY_ROWS + 6, m)
     small, rest = block(rest, 6, 6)
     geometry, spans = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS :]
-    ranges, taken = Ranges(spans[0], spans[1], spans[2], spans[3], spans[4]), spans[5]
+    ranges, taken = box_tensions.Ranges(spans[0], spans[1], spans[2], spans[3], spans[4]), spans[5]
     rotation, center, wrench, direction = small[:3, :3], small[3, :3], small[4], small[5]
     several = loads.segments.shape[0] + loads.ellipsoids.shape[0] + loads.sizes.size > 0
     for k in range(3):
@@ -99,21 +91,21 @@ def prove_boxes(
             continue
         if not set_cables_in_box(freedom, geometry, rotation, center, box, place):
             continue
-        set_ranges(limits.quantity, place, curves, ranges)
+        box_tensions.set_ranges(limits.quantity, place, curves, ranges)
         for a in range(6):
             wrench[a] = loads.center[a]
             direction[a] = 1.0 if a == 2 else 0.0
         upward = body[tables.MASS] * body[tables.GRAVITY] - wrench[2] + reach_of_loads(loads, direction)
-        tighten(freedom, place, curves, upward, ranges)
+        box_tensions.tighten(freedom, place, curves, upward, ranges)
         size = abs(upward)
         for a in range(6):
             size += abs(wrench[a])
         for i in range(m):
             size += ranges.low[i] + cables.half_weight[i]
             taken[i] = 0.0
-        if not search_limits(ranges, taken, size, centered):
+        if not box_tensions.search_limits(ranges, taken, size, centered):
             continue
-        square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+        square, smoothing = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
         outside = square > BEYOND * m * smoothing
         for attempt in range(ATTEMPTS if several else 1):
             if outside:
@@ -126,15 +118,16 @@ def prove_boxes(
             if several:
                 for i in range(m):
                     taken[i] = centered.give[i]
-                search_limits(ranges, taken, size, centered)
-                square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+                box_tensions.search_limits(ranges, taken, size, centered)
+                square, smoothing = box_tensions.center_tensions(
+                    place, curves, geometry, body, wrench, centered, ranges
+                )
         if several and verdicts[p] == OPEN:
-            in_wrench_space(place.rows, centered.left, direction)
+            box_tensions.in_wrench_space(place.rows, centered.left, direction)
             farthest(loads, direction, wrench)
-            for i in range(m):
-                taken[i] = 0.0
-            search_limits(ranges, taken, size, centered)
-            square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+            taken[:] = 0.0
+            box_tensions.search_limits(ranges, taken, size, centered)
+            square, smoothing = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
             outside = square > BEYOND * m * smoothing
         if outside and proves_outside(place, box, curves, smoothing, centered, ranges, precision, rest):
             verdicts[p] = OUTSIDE

@@ -27,6 +27,8 @@ from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_
 from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import Platform, fill_structure_matrix, is_rotation, place_cables, rows_along_freedom
+from sagline.kernels.workspaces import sag_force_bounds as sag
+from sagline.kernels.workspaces import wrench_set
 from sagline.kernels.workspaces.exact_margin import ABOVE, BELOW, VALUE, LimitingFacet, settle_margin
 from sagline.kernels.workspaces.facets import (
     DEPENDENT,
@@ -38,25 +40,6 @@ from sagline.kernels.workspaces.facets import (
     choose_basis,
     new_facets,
     next_subset,
-)
-from sagline.kernels.workspaces.sag_force_bounds import (
-    BAND_ROWS,
-    HIGH,
-    LOW,
-    OVER,
-    SAG_FORCE_HIGH,
-    SAG_FORCE_LOW,
-    SLOPE,
-    UNDER,
-    fill_bands,
-)
-from sagline.kernels.workspaces.wrench_set import (
-    SetTerms,
-    WrenchSetArrays,
-    new_set,
-    place_set,
-    reach_of_set,
-    worst_wrench,
 )
 
 # rounding error of the product of a normal with a column in its facet, relative to the terms of the product
@@ -113,7 +96,7 @@ def signed_margins(
     model_terms: ModelTerms,
     limit_terms: LimitTerms,
     robot_terms: Robots,
-    set_terms: SetTerms,
+    set_terms: wrench_set.SetTerms,
     arms: tuple[Array, Array],
     poses: Array,
     memory: MarginMemory,
@@ -145,20 +128,19 @@ def signed_margins(
     count, m, n = poses.shape[0], robots.shape[1], freedom.shape[0]
     cables, rest = new_cables(Memory(memory[0], memory[1]), m, robots_have_machine(robots))
     facets, rest = new_facets(rest, n, m)
-    wrenches, rest = new_set(set_terms, rest)
+    wrenches, rest = wrench_set.new_set(set_terms, rest)
     rotation, rest = block(rest, 3, 3)
     found, rest = vector(rest, 3)
     middle, rest = vector(rest, 6)
     wrench, rest = vector(rest, 6)
     measured, rest = vector(rest, FACET_SIZE)
-    rows, rest = block(rest, g.GEOMETRY_ROWS + BAND_ROWS + COUNT_ROWS, m)
-    geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + BAND_ROWS]
-    counted = rows[g.GEOMETRY_ROWS + BAND_ROWS :]
+    rows, rest = block(rest, g.GEOMETRY_ROWS + sag.BAND_ROWS + COUNT_ROWS, m)
+    geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + sag.BAND_ROWS]
+    counted = rows[g.GEOMETRY_ROWS + sag.BAND_ROWS :]
     for p in range(first, last):
         values[VALUE, p] = values[BELOW, p] = values[ABOVE, p] = -math.inf
         limiting[p] = -1
-        for k in range(6):
-            directions[p, k] = 0.0
+        directions[p] = 0.0
         body, robot = bodies[p * bodies.shape[0] // count], robots[p * robots.shape[0] // count]
         model = model_at(model_terms, body)
         cable_geometry(robot, body, poses[p], rotation, geometry)
@@ -177,20 +159,22 @@ def signed_margins(
             slack = cables.high[limiting[p]] < least_of_sag(model, cables.half_weight[limiting[p]])
             statuses[p] = codes.MARGIN_TOO_SLACK if slack else codes.MARGIN_INFEASIBLE
             continue
-        if not fill_bands(curves, bands, left):
+        if not sag.fill_bands(curves, bands, left):
             statuses[p] = codes.MARGIN_TOO_SLACK
             continue
-        place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
+        wrench_set.place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
         endless, curved = _fill_weights(body, set_terms[0], geometry, bands, counted, middle)
         if curved:
             _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
             choose_basis(facets, n, m, lever)
-        counts = _FacetWeights(counted, middle, bands[HIGH], endless, curved, arms[0][p * arms[0].size // count], lever)
+        counts = _FacetWeights(
+            counted, middle, bands[sag.HIGH], endless, curved, arms[0][p * arms[0].size // count], lever
+        )
         _measure_all_facets(facets, n, m, counts, wrenches, measured, found, directions[p])
         limiting[p] = _limiting_cable(counts, directions[p]) if found[VALUE] < math.inf else -1
         statuses[p] = _margin_status(found)
         if curved and statuses[p] == codes.MARGIN_OPEN:
-            single = worst_wrench(set_terms[0], wrenches, directions[p], wrench)
+            single = wrench_set.worst_wrench(set_terms[0], wrenches, directions[p], wrench)
             for k in range(6):
                 middle[k] -= set_terms[0][k]
             facet = LimitingFacet(
@@ -230,19 +214,19 @@ def _fill_weights(
         middle[a] = center[a]
     middle[2] -= body[tables.MASS] * body[tables.GRAVITY]
     for i in range(bands.shape[1]):
-        limited = bands[HIGH, i] < math.inf
+        limited = bands[sag.HIGH, i] < math.inf
         endless = endless or not limited
-        rows[WIDTH, i] = 0.5 * (bands[HIGH, i] - bands[LOW, i]) if limited else 0.0
-        rows[BELOW_SECANT, i], rows[ABOVE_SECANT, i] = bands[UNDER, i], bands[OVER, i]
-        curved = curved or bands[UNDER, i] < bands[OVER, i]
+        rows[WIDTH, i] = 0.5 * (bands[sag.HIGH, i] - bands[sag.LOW, i]) if limited else 0.0
+        rows[BELOW_SECANT, i], rows[ABOVE_SECANT, i] = bands[sag.UNDER, i], bands[sag.OVER, i]
+        curved = curved or bands[sag.UNDER, i] < bands[sag.OVER, i]
         x, y = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i]
         rows[LEVER_X, i] = x
         rows[LEVER_Y, i] = y
         for a in range(6):
-            middle[a] += rows[COLUMN + a, i] * (bands[LOW, i] + rows[WIDTH, i])
-        rise = 0.5 * (bands[SAG_FORCE_HIGH, i] - bands[SAG_FORCE_LOW, i]) if limited else 0.0
-        sag_force = bands[SAG_FORCE_LOW, i] + rise
-        slope = bands[SLOPE, i]
+            middle[a] += rows[COLUMN + a, i] * (bands[sag.LOW, i] + rows[WIDTH, i])
+        rise = 0.5 * (bands[sag.SAG_FORCE_HIGH, i] - bands[sag.SAG_FORCE_LOW, i]) if limited else 0.0
+        sag_force = bands[sag.SAG_FORCE_LOW, i] + rise
+        slope = bands[sag.SLOPE, i]
         middle[2] -= sag_force
         middle[3] -= sag_force * y
         middle[4] += sag_force * x
@@ -258,14 +242,13 @@ def _measure_all_facets(
     n: int,
     m: int,
     counts: _FacetWeights,
-    wrenches: WrenchSetArrays,
+    wrenches: wrench_set.WrenchSetArrays,
     measured: Array,
     margin: Array,
     direction: Array,
 ) -> None:
     """Fill the margin over all facets (3,), and the normal of the facet with the least value (6,)."""
-    for k in range(3):
-        margin[k] = math.inf
+    margin[:] = math.inf
     facets.minors[0, 0] = 1.0
     depth = 0
     held = 0
@@ -319,12 +302,17 @@ def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, 
 
 @kernel
 def _measure_facets(
-    counts: _FacetWeights, wrenches: WrenchSetArrays, held: int, measured: Array, margin: Array, direction: Array
+    counts: _FacetWeights,
+    wrenches: wrench_set.WrenchSetArrays,
+    held: int,
+    measured: Array,
+    margin: Array,
+    direction: Array,
 ) -> None:
     """Update the margin (3,) and its normal (6,) if a side of a stored facet has a smaller margin."""
     _sum_cables(counts, held, measured)
     normals, work = measured[: 6 * TOGETHER].reshape((6, TOGETHER)), measured[WORK : WORK + 2 * TOGETHER]
-    reach_of_set(wrenches, normals, held, work.reshape((2, TOGETHER)), measured[AGAINST:], measured[FOR:])
+    wrench_set.reach_of_set(wrenches, normals, held, work.reshape((2, TOGETHER)), measured[AGAINST:], measured[FOR:])
     if counts.endless:
         for b in range(held):
             if measured[UP + b] > ALONG * measured[ROUNDING + b]:

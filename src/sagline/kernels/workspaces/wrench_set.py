@@ -113,9 +113,7 @@ def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSetArrays, Memory]:
 def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wrenches: WrenchSetArrays) -> None:
     """Fill the segments of box and accelerations: forces -M a, moments -Q I Q^T alpha of a platform with rotation Q."""
     own = wrenches.own
-    for s in range(9):
-        for k in range(6):
-            own[s, k] = 0.0
+    own[:] = 0.0
     for k in range(6):
         own[k, k] = terms[1][k] + (body[tables.MASS] * terms[6][0] if k < 3 else 0.0)
     if terms[6][1] > 0.0:
@@ -136,8 +134,7 @@ def reach_of_set(
 
     normals: y, (6, B); work: work array, (2, B); against: filled, (B,); along: filled, (B,).
     """
-    for b in range(count):
-        against[b] = 0.0
+    against[:count] = 0.0
     _add_segments(wrenches.own, normals, count, work[0], against)
     _add_segments(wrenches.segments, normals, count, work[0], against)
     if wrenches.ellipsoids.shape[0] > 0:
@@ -162,8 +159,7 @@ def _add_segments(segments: Array, normals: Array, count: int, work: Array, tota
 def _add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, total: Array) -> None:
     """Add the extent of ellipsoids (E, 6, 6) to both sides."""
     for e in range(ellipsoids.shape[0]):
-        for b in range(count):
-            work[1, b] = 0.0
+        work[1, :count] = 0.0
         for j in range(6):
             if _multiply(ellipsoids[e, j], normals, count, work[0]):
                 for b in range(count):
@@ -179,12 +175,10 @@ def _add_polytopes(
     """Add the extent of polytopes in the directions of the normals, or in the opposite directions."""
     first = 0
     for p in range(sizes.size):
-        for b in range(count):
-            work[1, b] = -math.inf
+        work[1, :count] = -math.inf
         for c in range(first, first + sizes[p]):
             if not _multiply(corners[c], normals, count, work[0]):
-                for b in range(count):
-                    work[0, b] = 0.0
+                work[0, :count] = 0.0
             for b in range(count):
                 work[1, b] = max(work[1, b], sign * work[0, b])
         for b in range(count):
