@@ -20,11 +20,10 @@ from sagline.article.experiment import (
     experiment,
     in_process,
     level_poses,
-    pair,
     points,
     with_cells,
 )
-from sagline.article.explanations import ANCHORS, DRUM, LOAD, MODULUS, ZERO, Errors
+from sagline.article.explanations import ANCHORS, DRUM, LOAD, MODULUS, ZERO, Errors, robot_with_errors
 from sagline.article.ten_poses import HOME
 from sagline.control import Controller, EventKind, RefusedError, TensionSettings
 from tests.refusal import refused
@@ -40,6 +39,23 @@ CLASSES: dict[str, Errors] = {
     "zero of the lengths -6.5 mm": {ZERO: -6.5},
 }
 PAGE = Path(__file__).parents[2] / "docs" / "experiment.md"
+
+
+def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
+    """The robot with errors, and the robot of the plan, both with the data that a twin needs."""
+    true, nominal = robot_with_errors(robot, errors), robot
+    assert true.winches is not None
+    assert robot.winches is not None
+    if errors.get(DRUM):
+        radius = robot.winches.drum_radius
+        assert radius is not None
+        true = true.replace(winches=true.winches.replace(drum_radius=radius * (1.0 + 0.01 * errors[DRUM])))
+    if errors.get(ZERO):
+        assert true.winches is not None
+        zero = sl.inverse(robot, level_poses(HOME)).unstrained_length
+        nominal = robot.replace(winches=robot.winches.replace(length_zero=zero))
+        true = true.replace(winches=true.winches.replace(length_zero=zero + 1e-3 * errors[ZERO]))
+    return true, nominal
 
 
 @extended

@@ -67,8 +67,8 @@ def test_returned_data_do_not_change_later() -> None:
     table, cycles = CycleTable(M, G, 2), [made(k) for k in range(4)]
     for cycle in cycles[:2]:
         table.add(cycle)
-    column, before = table.column("winch_rate"), table.column("winch_rate").copy()
+    column, before = table.rows["sample"]["rate"], table.rows["sample"]["rate"].copy()
     for cycle in cycles[2:]:
         table.add(cycle)
     assert np.array_equal(column, before)
-    assert len(table.column("winch_rate")) == 4
+    assert len(table.rows) == 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import SupportsFloat, TypeAlias
 
 import numpy as np
 
@@ -37,14 +37,14 @@ NEARLY = 1e-6  # angle from vertical or level [rad]
 TURN = (0.3, 0.2, 0.1)  # [rad], about z, y, x
 
 # label, value, unit; for a difference, also the size of its terms, so that rounding errors can be recognized
-Number: TypeAlias = tuple[str, float, str] | tuple[str, float, str, float]
+Number: TypeAlias = tuple[str, SupportsFloat, str] | tuple[str, SupportsFloat, str, float]
 
 
 def _erratum(number: int, numbers: Sequence[Number]) -> Finding:
     """Finding of an erratum of docs/errata.md, with the numbers that prove it."""
     rows = [(label, n(value, ".5g", unit, size=size[0] if size else 0.0)) for label, value, unit, *size in numbers]
     table = Table("Computed", ("quantity", "value"), rows)
-    return finding(f"erratum-{number}", {label: value for label, value, *_ in numbers}, data=(table,))
+    return finding(f"erratum-{number}", {label: float(value) for label, value, *_ in numbers}, data=(table,))
 
 
 def sign_of_intercept() -> Finding:
@@ -56,14 +56,14 @@ def sign_of_intercept() -> Finding:
     intercept = state.vertical_force - np.tan(angle) * state.horizontal_tension
     published = sl.Empirical()
     numbers: list[Number] = [
-        ("b_π at the platform end divided by wD/2", float((intercept / half_weight)[0]), ""),
-        ("b_π at the frame end divided by wD/2", float(((intercept - state.cable_weight) / half_weight)[0]), ""),
+        ("b_π at the platform end divided by wD/2", (intercept / half_weight)[0], ""),
+        ("b_π at the frame end divided by wD/2", ((intercept - state.cable_weight) / half_weight)[0], ""),
     ]
     for name in ROBOTS:
         for sign, model in (("right", published), ("printed", sl.Empirical(-published.k_h, published.k_p))):
             run = sl.confirm(sl.inverse(sl.load_robot(name), sl.article_path(PATH_RATE), model, METHOD))
             error = 1e3 * np.linalg.norm(run.position_error, axis=1)
-            numbers.append((f"largest position error, {name}, {sign} sign", float(error.max()), "mm"))
+            numbers.append((f"largest position error, {name}, {sign} sign", error.max(), "mm"))
     return _erratum(1, numbers)
 
 
@@ -96,11 +96,11 @@ def euler_rates() -> Finding:
         (
             ("largest component of ω minus Euler rates", _largest(spin - _reversed(rates)), "rad/s"),
             ("largest component of ω̇ minus their rates", _largest(spin_rate - _reversed(curvatures)), "rad/s²"),
-            ("error of the moment", float(np.linalg.norm(right - printed)), "N m"),
-            ("moment", float(np.linalg.norm(right)), "N m"),
+            ("error of the moment", np.linalg.norm(right - printed), "N m"),
+            ("moment", np.linalg.norm(right), "N m"),
             (
                 "force of M W ẋ at 1 m/s; the correct value is 0",
-                float(robot.mass * np.linalg.norm(np.cross(_reversed(rates), velocity))),
+                robot.mass * np.linalg.norm(np.cross(_reversed(rates), velocity)),
                 "N",
             ),
             ("the same errors at constant orientation", _largest(at_rest), "rad/s"),
@@ -118,16 +118,11 @@ def rank_of_h() -> Finding:
     return _erratum(
         4,
         (
-            ("rows of HᵀH", float(len(square)), ""),
-            ("rank of HᵀH", float(np.linalg.matrix_rank(square)), ""),
-            ("its smallest singular value divided by its largest", float(singular[-1] / singular[0]), "", 1.0),
-            ("condition of HHᵀ", float(np.linalg.cond(h @ h.T)), ""),
-            (
-                "residual of Hᵀ(HHᵀ)⁻¹",
-                float(np.abs(h @ tension + balance.b).max()),
-                "N",
-                float(np.abs(balance.b).max()),
-            ),
+            ("rows of HᵀH", len(square), ""),
+            ("rank of HᵀH", np.linalg.matrix_rank(square), ""),
+            ("its smallest singular value divided by its largest", singular[-1] / singular[0], "", 1.0),
+            ("condition of HHᵀ", np.linalg.cond(h @ h.T), ""),
+            ("residual of Hᵀ(HHᵀ)⁻¹", np.abs(h @ tension + balance.b).max(), "N", float(np.abs(balance.b).max())),
         ),
     )
 
@@ -234,7 +229,7 @@ def vertical_and_level() -> Finding:
     half_weight = 0.5 * float(cable.linear_density) * GRAVITY * chord
     vertical = sl.Catenary().from_tension(cable, 0.0, -chord, 100.0, GRAVITY)
     level = sl.Catenary().from_tension(cable, chord, 0.0, 100.0, GRAVITY)
-    numbers: list[Number] = [("|tan φ| a microradian from vertical", float(abs(np.tan(0.5 * np.pi - NEARLY))), "")]
+    numbers: list[Number] = [("|tan φ| a microradian from vertical", abs(np.tan(0.5 * np.pi - NEARLY)), "")]
     for distance, label in ((1e-3, "1 mm"), (1e-6, "1 µm")):
         pose = sl.Pose.from_euler(under + np.array([distance, 0.0, 0.0]), 0.0, 0.0, 0.0)
         condition = float(np.linalg.cond(sl.article_balance(robot, pose).h))
@@ -243,8 +238,8 @@ def vertical_and_level() -> Finding:
         numbers.append((f"condition of J {label} from under an anchor", condition, ""))
     numbers += [
         ("bound (54) a microradian from level", half_weight / float(np.tan(NEARLY)), "N"),
-        ("length of the exact vertical cable of 10 m at 100 N", float(vertical.unstrained_length), "m"),
-        ("length of the exact level cable of 10 m at 100 N", float(level.unstrained_length), "m"),
+        ("length of the exact vertical cable of 10 m at 100 N", vertical.unstrained_length, "m"),
+        ("length of the exact level cable of 10 m at 100 N", level.unstrained_length, "m"),
     ]
     return _erratum(8, numbers)
 
@@ -285,9 +280,9 @@ def table_number() -> Finding:
     return _erratum(
         10,
         (
-            ("poses in Table 2", float(len(table2().points)), ""),
-            ("cables of either robot", float(suspended.cable_count), ""),
-            ("both robots agree in Table 1's parameters (1: yes)", float(same), ""),
+            ("poses in Table 2", len(table2().points), ""),
+            ("cables of either robot", suspended.cable_count, ""),
+            ("both robots agree in Table 1's parameters (1: yes)", same, ""),
         ),
     )
 
@@ -302,8 +297,8 @@ def printed_formulas() -> Finding:
         11,
         (
             ("least |T| on a line π, by search", least, "N"),
-            ("|b_π|/√(1 + a_π²)", float(intercept / np.hypot(1.0, slope)), "N"),
-            ("|b_π|/√(a_π² + b_π²), as printed", float(intercept / np.hypot(slope, intercept)), "N"),
+            ("|b_π|/√(1 + a_π²)", intercept / np.hypot(1.0, slope), "N"),
+            ("|b_π|/√(a_π² + b_π²), as printed", intercept / np.hypot(slope, intercept), "N"),
             (
                 "error of an anchor by the transpose, at a rotation of (0.3, 0.2, 0.1) rad",
                 1e3 * float(np.linalg.norm(turned.T @ anchor - turned @ anchor)),

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 import sagline as sl
 from sagline import control
-from sagline.article.explanations import DRUM, ZERO, Errors, robot_with_errors
 from sagline.article.ten_poses import HOME, Table2, table2
 from sagline.control.link import PERIOD
 from sagline.core.arrays import Array, locked
@@ -133,23 +132,6 @@ class Experiment:
     def distance(self) -> Array:
         """Euclidean distance of true and desired position [m], shape (10,)."""
         return np.asarray(np.linalg.norm(self.error, axis=1))
-
-
-def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
-    """The robot with errors, and the robot of the plan, both with the data that a twin needs."""
-    true, nominal = robot_with_errors(robot, errors), robot
-    assert true.winches is not None
-    assert robot.winches is not None
-    if errors.get(DRUM):
-        radius = robot.winches.drum_radius
-        assert radius is not None
-        true = true.replace(winches=true.winches.replace(drum_radius=radius * (1.0 + 0.01 * errors[DRUM])))
-    if errors.get(ZERO):
-        assert true.winches is not None
-        zero = sl.inverse(robot, level_poses(HOME)).unstrained_length
-        nominal = robot.replace(winches=robot.winches.replace(length_zero=zero))
-        true = true.replace(winches=true.winches.replace(length_zero=zero + 1e-3 * errors[ZERO]))
-    return true, nominal
 
 
 def with_cells(robot: sl.Robot) -> sl.Robot:

@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 import numpy as np
 
 from sagline.control.link import Sample
 from sagline.control.null_space import TensionSettings, gains_along
-from sagline.control.recording import (
-    ASKED,
-    PLACE,
-    REAL_OF_GROUPS,
-    REAL_OF_WINCHES,
-    REAL_OWN,
-    WHOLE_OF_GROUPS,
-    WHOLE_OF_WINCHES,
-    CycleTable,
-    Event,
-)
+from sagline.control.recording import CycleTable, Event
 from sagline.control.states import State
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
@@ -190,9 +180,6 @@ class Execution(Result, Saved, Tabular):
         return Pose._adopt(self.position, self.quaternion)
 
 
-_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # in `CycleTable` and `Execution`
-
-
 def execution_of(
     table: CycleTable,
     robot: Robot,
@@ -204,8 +191,8 @@ def execution_of(
     events: tuple[Event, ...],
 ) -> Execution:
     """Create an execution from the cycles in `table`; `period` [s]; `zero` [m], (m,)."""
-    arrays: dict[str, Any] = {name: locked(table.column(name)) for name in _COLUMNS}
-    arrays |= {name: locked(table.column(name).astype(np.int8)) for name in ("state", "estimate", "mode")}
+    rows: Any = table.rows
+    names, sample = rows.dtype.names, rows["sample"]
     return Execution(
         robot=robot,
         plan=plan,
@@ -214,17 +201,9 @@ def execution_of(
         period=period,
         zero=locked(zero.copy()),
         events=events,
-        answered=locked(table.column("answered").astype(np.bool_)),
-        samples=_samples(table),
-        **arrays,
+        samples=Samples(locked(rows["time"]), **{name: locked(sample[name]) for name in sample.dtype.names}),
+        **{name: locked(rows[name]) for name in names if name != "sample"},
     )
-
-
-def _samples(table: CycleTable) -> Samples:
-    columns = {f"group_{name}": name for name in REAL_OF_GROUPS + WHOLE_OF_GROUPS}
-    columns |= {f"winch_{name}": name for name in REAL_OF_WINCHES + WHOLE_OF_WINCHES}
-    arrays: dict[str, Any] = {name: locked(table.column(column)) for column, name in columns.items()}
-    return Samples(time=locked(table.column("time")), **arrays)
 
 
 def planned_position(execution: Execution) -> Array:

@@ -151,6 +151,11 @@ class Sample(NamedTuple):
     reasons: tuple[Refusal | None, ...] = ()
 
 
+# fields of a sample with one value per winch (the other fields: one per group), and fields with real numbers
+OF_WINCHES: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault")
+REALS: Final = ("age", "plc_time", "length", "rate", "torque", "tension", "filtered")
+
+
 class Missing(NamedTuple):
     """Answer of a link without a sample, because some groups have never answered.
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 from math import nan
-from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.control.link import Command, Missing, Sample
+from sagline.control.link import OF_WINCHES, REALS, Command, Missing, Sample
 from sagline.control.states import State
 from sagline.core.arguments import brief
-from sagline.core.arrays import Array, Indices
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.status import Status
 from sagline.kinematics.plan import Plan
@@ -45,17 +45,6 @@ class Event(NamedTuple):
     name: str
     state: State
     text: str
-
-
-# names in the record of a cycle with m winches and G groups: first real numbers, then whole numbers
-REAL_OWN: Final = ("time", "late", "clock")
-PLACE: Final = (("position", 3), ("quaternion", 4))
-REAL_OF_GROUPS: Final = ("age", "plc_time")
-REAL_OF_WINCHES: Final = ("length", "rate", "torque", "tension", "filtered")
-ASKED: Final = ("set_length", "set_rate", "set_tension", "planned_tension", "correction")
-WHOLE_OWN: Final = ("answered", "state", "estimate", "mode")
-WHOLE_OF_GROUPS: Final = ("counter", "owner", "echo", "status", "fault", "discarded")
-WHOLE_OF_WINCHES: Final = ("counts", "state", "winch_fault")
 
 
 class Recorded(NamedTuple):
@@ -134,21 +123,24 @@ class CycleTable:
     """Table of cycles in preallocated memory."""
 
     def __init__(self, cable_count: int, group_count: int, expected: int) -> None:
-        """Allocate memory."""
-        m, g = cable_count, group_count
-        own = dict.fromkeys(REAL_OWN, 1)
-        groups = {f"group_{name}": g for name in REAL_OF_GROUPS}
-        winches = {f"winch_{name}": m for name in REAL_OF_WINCHES}
-        self._real = _columns(own | dict(PLACE) | groups | winches | dict.fromkeys(ASKED, m))
-        groups = {f"group_{name}": g for name in WHOLE_OF_GROUPS}
-        winches = {f"winch_{name}": m for name in WHOLE_OF_WINCHES}
-        self._whole = _columns(dict.fromkeys(WHOLE_OWN, 1) | groups | winches)
-        rows, (real, whole) = max(expected, 1), (_width(columns) for columns in (self._real, self._whole))
-        self._numbers, self._codes = np.empty((rows, real)), np.empty((rows, whole), dtype=np.int64)
+        """Allocate memory for `expected` cycles."""
+        m, real = cable_count, np.float64
+        sample = np.dtype(
+            [
+                (name, real if name in REALS else np.int64, m if name in OF_WINCHES else group_count)
+                for name in Sample._fields[1:-1]  # without the time and the reasons
+            ]
+        )
+        asked = [(name, real, m) for name in ("set_length", "set_rate", "set_tension", "planned_tension", "correction")]
+        own = [("time", real), ("late", real), ("clock", real), ("position", real, 3), ("quaternion", real, 4)]
+        codes = [("answered", np.bool_), ("state", np.int8), ("estimate", np.int8), ("mode", np.int8)]
+        self._rows = np.zeros(max(expected, 1), np.dtype([*own, *asked, ("sample", sample), *codes], align=True))
         self._count = 0
-        self._no_sample = np.full(len(REAL_OF_GROUPS) * g + len(REAL_OF_WINCHES) * m, nan)
-        self._no_codes = np.zeros(whole - len(WHOLE_OWN), dtype=np.int64)
-        self._no_command = np.full(3 * m, nan)
+        self._no_command = np.full(m, nan)
+        blank = np.zeros(1, sample)  # floats are NaN, and integers are 0
+        for name in REALS:
+            blank[name] = nan
+        self._no_sample = blank[0]
 
     def __len__(self) -> int:
         """Number of cycles so far."""
@@ -157,47 +149,23 @@ class CycleTable:
     def add(self, cycle: Recorded) -> None:
         """Add a cycle."""
         k = self._count
-        if k == len(self._numbers):
-            self._numbers, self._codes = (np.concatenate((old, np.empty_like(old))) for old in self._tables)
-        answer, command = cycle.answer, cycle.command
-        read: tuple[Array, ...] = (self._no_sample,)
-        codes: tuple[Indices, ...] = (self._no_codes,)
-        asked: tuple[Array, ...] = (self._no_command,)
-        mode = -1
-        if isinstance(answer, Sample):
-            _, age, counter, plc_time, owner, echo, status, fault, *winches, counts, state, drive, discarded, _ = answer
-            read = (age, plc_time, *winches)
-            codes = (counter, owner, echo, status, fault, discarded, counts, state, drive)
+        if k == len(self._rows):
+            self._rows = np.concatenate((self._rows, np.empty_like(self._rows)))
+        answer, command, mode, asked = cycle.answer, cycle.command, -1, (self._no_command,) * 3
         if command is not None:
-            mode, asked = command.mode, (command.length + cycle.zero, command.rate, command.tension)
-        own = (answer.time, cycle.late, cycle.clock)
-        sight = (cycle.position, cycle.quaternion)
-        np.concatenate((own, *sight, *read, *asked, cycle.planned_tension, cycle.correction), out=self._numbers[k])
+            mode, asked = int(command.mode), (command.length + cycle.zero, command.rate, command.tension)
+        answered = isinstance(answer, Sample)
+        own = answer.time, cycle.late, cycle.clock, cycle.position, cycle.quaternion
+        sample: Any = answer[1:-1] if answered else self._no_sample
         # plain integers, because numpy converts members of an enumeration ten times slower
-        about = (int(answer.__class__ is Sample), int(cycle.state), cycle.estimate, int(mode))
-        np.concatenate((about, *codes), out=self._codes[k])
+        codes = answered, int(cycle.state), cycle.estimate, mode
+        self._rows[k] = (*own, *asked, cycle.planned_tension, cycle.correction, sample, *codes)
         self._count = k + 1
 
     @property
-    def _tables(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        return self._numbers, self._codes
-
-    def column(self, name: str) -> NDArray[Any]:
-        """Values of the quantity `name` over the cycles, (N,) or (N, width), not copied."""
-        rows = slice(self._count)
-        whole = name in self._whole
-        found: NDArray[Any] = self._codes[rows, self._whole[name]] if whole else self._numbers[rows, self._real[name]]
-        return found[:, 0] if name in REAL_OWN or name in WHOLE_OWN else found
-
-
-def _columns(widths: dict[str, int]) -> dict[str, slice]:
-    """Columns of each quantity in a table."""
-    ends = np.cumsum(list(widths.values())).tolist()
-    return {name: slice(end - width, end) for (name, width), end in zip(widths.items(), ends, strict=True)}
-
-
-def _width(columns: dict[str, slice]) -> int:
-    return max(int(part.stop) for part in columns.values())
+    def rows(self) -> NDArray[Any]:
+        """Cycles so far, (N,), not copied. Fields: those of `Execution`, and `sample` with the fields of `Samples`."""
+        return self._rows[: self._count]
 
 
 class Journal:

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import GROUP_SIZE, Command, Refusal, Sample, Whole, groups_of
+from sagline.control.link import GROUP_SIZE, OF_WINCHES, REALS, Command, Refusal, Sample, Whole, groups_of
 from sagline.core.arrays import Array
 
 LAYOUT: Final = 1  # version of the blocks; incremented with every change of an offset below
@@ -222,10 +222,10 @@ def sample_of(
     """Create a sample from valid blocks of all groups; `time` [s]; `age` [s], `discarded` and `reasons`: (G,)."""
     heads = ("counter", "owner", "echo", "status", "fault")
     columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
-    for name in ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault"):
+    for name in OF_WINCHES:
         rows = [winch_row(i, name.removeprefix("winch_")) for i in range(GROUP_SIZE)]
         values = [group[row] for group in groups for row in rows][:winches]
-        columns[name] = np.array(values, dtype=np.int64 if name in ("counts", "state", "winch_fault") else np.float64)
+        columns[name] = np.array(values, dtype=np.float64 if name in REALS else np.int64)
     plc_time = np.array([1e-6 * group["time"] for group in groups])
     return Sample(time=time, age=age, plc_time=plc_time, discarded=discarded, reasons=reasons, **columns)
 

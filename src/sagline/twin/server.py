@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import Command, Mode, Refusal, groups_of
+from sagline.control.link import OF_WINCHES, Command, Mode, Refusal, groups_of
 from sagline.control.real_time import Pace
 from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
@@ -32,7 +32,7 @@ SCAN: Final = 0.005  # scan period of a twin's PLCs [s]: half a control cycle, s
 SILENT: Final = bytes(FROM_PLC.size)
 HALF: Final = 2**31
 MODES: Final = frozenset(Mode)
-ROWS: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "state", "fault")
+ROWS: Final = (*OF_WINCHES[:-1], "fault")  # names in the block of a PLC
 
 
 class Server:
