@@ -61,7 +61,7 @@ def finding(
     data: Sequence[Table] = (),
     **words: Any,
 ) -> Finding:
-    """Finding with a key; its texts use `numbers` and `words`; `numbers` are also saved."""
+    """Create the finding `key`. Its texts use `numbers` and `words`, and `numbers` are also saved."""
     entry, known = _texts()["findings"][key], numbers or {}
     statement, measured = (_Numbers().format(entry.get(part, ""), **{**known, **words}) for part in _PARTS)
     return Finding(
@@ -79,7 +79,7 @@ def finding(
 
 
 def chapter(key: str, findings: Sequence[Finding], **words: Any) -> Chapter:
-    """Chapter with a key; its introduction uses `words`."""
+    """Create the chapter `key`; its introduction uses `words`."""
     entry = _texts()["chapters"][key]
     return Chapter(key, entry["title"], _Numbers().format(entry["lead"], **words), tuple(findings))
 
@@ -107,11 +107,11 @@ class Drawings:
     """Converter of figures to the drawings of a page; identifiers are unique in the page."""
 
     def __init__(self, page: str) -> None:
-        """Prepare drawings; their identifiers begin with the name of this part of the page."""
+        """Prepare drawings; their identifiers begin with `page`, the name of this part of the page."""
         self._names = (f"{page}-{k}-" for k in count(1))
 
     def panel(self, figure: Sheet, caption: str, legend: str = "") -> Panel:
-        """Convert a figure to a drawing with a legend, its title is `legend`; screen readers read the caption."""
+        """Convert `figure` to a drawing of the page. A legend with the title `legend` is drawn if curves have names."""
         if figure.axes[0].get_legend_handles_labels()[1]:
             legend_above(figure.axes[0], legend)
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
@@ -198,14 +198,14 @@ def shades(number: int) -> list[tuple[float, float, float, float]]:
 
 
 def thinning(number: int) -> slice:
-    """At most `MOST_POINTS` samples, at equal index steps."""
+    """Slice of at most `MOST_POINTS` of `number` samples, at equal steps of the index."""
     return slice(None, None, max(1, number // MOST_POINTS))
 
 
 def cables_over_time(
     time: Array, values: Array, label: str, width: float, name: str = "", stops: Iterable[float] = ()
 ) -> Sheet:
-    """Draw one line per cable over time, from values (N, m), and a vertical line at each stop."""
+    """Draw one line per cable over `time` from `values` (N, m), and a vertical line at each of the `stops`."""
     figure, ax = axes("time without stops [s]" if stops else "time [s]", label, height=2.7)
     part = thinning(len(time))
     for i, course in enumerate(values[part].T):
@@ -216,7 +216,7 @@ def cables_over_time(
 
 
 def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
-    """Draw one curve, sampled at x, with its fit."""
+    """Draw one curve with samples at `x`, and its fit."""
     ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
     ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
 
@@ -224,7 +224,7 @@ def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
 def error_panels(
     names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str, draw: Drawings
 ) -> list[Panel]:
-    """Draw errors as areas of circles at positions (N, 3), seen along y and x; series: label, errors, scale, color."""
+    """Draw errors as circle areas at `position` (N, 3), seen along y and x; `series`: label, errors, scale, color."""
     panels = []
     for column, name in ((0, "x"), (1, "y")):
         figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
@@ -253,7 +253,7 @@ def draw_courses(ax: Axes, courses: Courses) -> None:
 def course_panels(
     courses: Courses, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
 ) -> tuple[Panel, Panel]:
-    """Draw a single curve and all curves, with labels of both axes and of the legend."""
+    """Draw the curve `one` and all curves; `labels`: of both axes, and title of the legend."""
     x, rows, fine, fits, _ = courses
     figure, ax = axes(*labels[:2])
     with_fit(ax, x, rows[one], fine, fits[one])

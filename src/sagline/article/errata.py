@@ -128,7 +128,7 @@ def rank_of_h() -> Finding:
 
 
 def _lifted(force: float) -> float:
-    """Vertical force of all cables together [N], if (49) is solved for a given vertical force."""
+    """Vertical force of all cables together [N], if (49) is solved for the vertical force `force` [N]."""
     robot = sl.load_robot(ROBOTS[0])
     pose = sl.Pose.from_euler(POSE, 0.0, 0.0, 0.0)
     balance = sl.article_balance(robot, pose)

@@ -160,7 +160,7 @@ def in_process(
 
 
 def experiment(controller: control.Controller, watch: StopObserver) -> Experiment:
-    """Run the experiment; raises RefusedError if connecting or homing fails, or the experiment ends early."""
+    """Run the experiment. Raise RefusedError if connecting or homing fails, or if the experiment ends early."""
     legs = _legs(controller.period)
     controller.connect()
     controller.home(level_poses(HOME))

@@ -67,13 +67,13 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
 
 
 def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
-    """Actual lengths that the winches give for commanded lengths."""
+    """Actual lengths that the winches give for the commanded lengths of `plan`, counted from `home`."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
-    """Equilibria of robots with errors; their lengths are planned for the robot without errors."""
+    """Equilibria (K, N, 3) [m] of robots with `errors`; their lengths are planned for the robot without errors."""
     # In the home pose, the encoders are set to the planned lengths. Therefore, the lengths on pulleys and the dead
     # lengths at home have no effect.
     robots = [robot_with_errors(robot, one) for one in errors]
@@ -173,12 +173,12 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
 
 
 def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
-    """All models with one parameter, with two parameters, and so on."""
+    """All models with one to `most` of the `parameters`."""
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
 
 def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[tuple[Array, Array]]:
-    """Position errors (3 N,) [m] and their derivatives (3 N, k) [m per unit of the parameter], for each fit."""
+    """Position errors (3 N,) [m] and derivatives (3 N, k) [m per unit] of each of the `models`, at its `values`."""
     # the steps of finite differences are away from upper limits
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
@@ -208,7 +208,7 @@ def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
 
 
 def corrected_aic(rms: float, count: int, parameters: int) -> float:
-    """Akaike's information criterion, corrected for a small number of measurements."""
+    """Akaike's information criterion, corrected for a small number `count` of measurements; `rms` is in m."""
     # source: Hurvich and Tsai 1989, Biometrika 76(2), 297-307
     unknown = parameters + 1
     return float(

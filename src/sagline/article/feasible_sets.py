@@ -51,7 +51,7 @@ class _FeasibleSets:
 def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> _FeasibleSets:
-    """The article's sets psi and curve Psi, computed exactly."""
+    """The article's sets psi at `psi_tensions` [N] and curve Psi at `tensions` [N], computed exactly."""
     # At a given L, the map from T to B is one to one. The inverse map of the outline of the tolerance, |dx| + |dz| =
     # epsilon_max around B_d, is therefore the outline of psi. A search is not necessary. Source: Gia Luan & Truong
     # Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2

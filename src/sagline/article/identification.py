@@ -142,7 +142,7 @@ def _measured() -> Finding:
 
 
 def _made_up_fit(cable: sl.Cable, lowest: float, highest: float, unknowns: tuple[str, ...]) -> CableFit:
-    """Identify a known cable from measurements with random scatter, over a range of chord tensions [N]."""
+    """Identify `cable` from measurements with random scatter, at chord tensions from `lowest` to `highest` [N]."""
     random = np.random.default_rng(SEED)
     span, rise = random.uniform(2.0, 12.0, SAMPLES), random.uniform(-4.0, 2.0, SAMPLES)
     tension: Array = random.uniform(lowest, highest, SAMPLES)

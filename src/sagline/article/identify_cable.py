@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -132,67 +133,65 @@ def identify_cable(
     """
     names = _checked_unknowns(unknowns)
     choice(tension_at, "tension_at", get_args(TensionAt))
-    data = _Measured(
+    data = (
         checked(span, "span", "m", shape=(None,), above=0.0),
         checked(rise, "rise", "m", shape=(None,)),
         checked(unstrained_length, "unstrained_length", "m", shape=(None,), above=0.0),
         checked(tension, "tension", "N", shape=(None,), above=0.0),
-        tension_at,
-        number(gravity, "gravity", "m/s^2", above=0.0),
     )
-    data.check(len(names))
+    acceleration = number(gravity, "gravity", "m/s^2", above=0.0)
+    sizes = {array.shape for array in data}
+    if len(sizes) > 1 or data[0].size < len(names):
+        raise InvalidValueError(
+            "the measurements",
+            f"of shapes {sorted(sizes)}",
+            f"four arrays of equal length, at least {len(names)}",
+            "Give span, rise, length and tension of at least one measurement per unknown.",
+        )
     errors = (
         number(length_error, "length_error", "m", above=0.0),
         number(tension_error, "tension_error", "N", above=0.0),
     )
-    return _fit(data, names, _checked_start(start), *errors)
+    predicted = partial(_predicted_length, span=data[0], rise=data[1], tension_at=tension_at, gravity=acceleration)
+    return _fit(predicted, *data[2:], names, _checked_start(start), *errors)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Measured:
-    span: Array
-    rise: Array
-    length: Array
-    tension: Array
-    tension_at: TensionAt
-    gravity: float
-
-    def check(self, unknowns: int) -> None:
-        sizes = {array.shape for array in (self.span, self.rise, self.length, self.tension)}
-        if len(sizes) > 1 or self.span.size < unknowns:
-            raise InvalidValueError(
-                "the measurements",
-                f"of shapes {sorted(sizes)}",
-                f"four arrays of equal length, at least {unknowns}",
-                "Give span, rise, length and tension of at least one measurement per unknown.",
-            )
-
-    def predicted(self, cable: Cable, tension: Array) -> Array:
-        """Lengths [m] of exact cables whose tension at the place of measurement is given."""
-        chord = np.hypot(self.span, self.rise)
-        half = 0.5 * cable.linear_density * self.gravity * chord
-        side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[self.tension_at]
-        across = half * self.span / chord if side else 0.0
-        floor = 1e-3 * tension  # a lower limit, because half the weight of the cable can exceed the measured tension
-        tau = np.maximum(side * half * self.rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
-        state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
-        for _ in range(ITERATIONS if side else 0):
-            measured = state.frame_end_tension if side > 0.0 else state.platform_end_tension
-            step = tension - measured
-            tau = np.maximum(tau + step, floor)
-            state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
-            if np.abs(step).max() <= 1e-10 * tension.max():
-                break
-        return state.unstrained_length
+def _predicted_length(
+    cable: Cable, tension: Array, *, span: Array, rise: Array, tension_at: TensionAt, gravity: float
+) -> Array:
+    """Lengths [m] of exact cables with the tension `tension` [N] at the place of measurement."""
+    chord = np.hypot(span, rise)
+    half = 0.5 * cable.linear_density * gravity * chord
+    side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[tension_at]
+    across = half * span / chord if side else 0.0
+    floor = 1e-3 * tension  # a lower limit, because half the weight of the cable can exceed the measured tension
+    tau = np.maximum(side * half * rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
+    state = Catenary().from_tension(cable, span, rise, tau, gravity)
+    for _ in range(ITERATIONS if side else 0):
+        measured = state.frame_end_tension if side > 0.0 else state.platform_end_tension
+        step = tension - measured
+        tau = np.maximum(tau + step, floor)
+        state = Catenary().from_tension(cable, span, rise, tau, gravity)
+        if np.abs(step).max() <= 1e-10 * tension.max():
+            break
+    return state.unstrained_length
 
 
-def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: float, tension_error: float) -> CableFit:
+def _fit(
+    predicted: Callable[[Cable, Array], Array],
+    length: Array,
+    tension: Array,
+    names: tuple[str, ...],
+    known: Cable,
+    length_error: float,
+    tension_error: float,
+) -> CableFit:
     from scipy.optimize import least_squares
 
     # logarithms keep density and stiffness positive; the offset is in millimeters
     scale = np.array([1e-3 if name == "length_offset" else 1.0 for name in names])
     unknown = np.array([0.0 if name == "length_offset" else np.log(float(getattr(known, name))) for name in names])
-    spread = np.full(data.length.size, length_error)
+    spread = np.full(length.size, length_error)
 
     def cable_of(x: Array) -> tuple[Cable, float]:
         given = dict(zip(names, x, strict=True))
@@ -201,21 +200,21 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
 
     def residuals(x: Array) -> Array:
         cable, offset = cable_of(x)
-        return data.length - offset - data.predicted(cable, data.tension)
+        return length - offset - predicted(cable, tension)
 
     for _ in range(WEIGHTINGS):
         found = least_squares(lambda x: residuals(x) / spread, unknown, x_scale="jac", bounds=_bounds(names))  # noqa: B023
         unknown = found.x
         cable, offset = cable_of(unknown)
-        higher, lower = (data.predicted(cable, f * data.tension) for f in (1.0 + 1e-4, 1.0 - 1e-4))
-        slope = (higher - lower) / (2e-4 * data.tension)
+        higher, lower = (predicted(cable, f * tension) for f in (1.0 + 1e-4, 1.0 - 1e-4))
+        slope = (higher - lower) / (2e-4 * tension)
         spread = np.hypot(length_error, slope * tension_error)
     # covariance with the weights of the last iteration
     jacobian = found.jac
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
     values = np.array([offset if name == "length_offset" else float(getattr(cable, name)) for name in names])
     unit = np.where(scale < 1.0, scale, values)  # derivative d value/d unknown
-    freedom = max(data.length.size - len(names), 1)
+    freedom = max(length.size - len(names), 1)
     rest = residuals(unknown)
     return CableFit(
         cable=cable,

@@ -80,7 +80,7 @@ def models_chapter() -> Chapter:
 
 
 def _study(**varied: Array) -> tuple[Array, Array]:
-    """Errors as functions of the given quantities; all other quantities have their reference values."""
+    """Errors as functions of the quantities `varied`; all other quantities have their reference values."""
     at = (varied.get(name, np.array([REFERENCE[name]])) for name in ("chord", "angle", "density", "tension"))
     return model_errors(float(simulated_cable().axial_stiffness), *at)
 

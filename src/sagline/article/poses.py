@@ -309,7 +309,7 @@ def _values(found: Explanation) -> str:
 
 
 def _told(found: Explanation, name: str) -> str:
-    """Text of a value with its standard uncertainty, or with a mark if the value is at a limit."""
+    """Text of the value of `name`: with its standard uncertainty, or with a mark if the value is at a limit."""
     k = found.place(name)
     value, unit = found.values[k], found.parameters[k].unit
     if found.at_limit[k]:

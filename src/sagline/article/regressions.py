@@ -26,7 +26,7 @@ class FittedLine(NamedTuple):
 
 
 def fit_line(x: Array, y: Array) -> FittedLine:
-    """Fit a least-squares line to samples along the last axis."""
+    """Fit least-squares lines to the samples `x` and `y` along the last axis."""
     x, y = np.broadcast_arrays(x, y)
     away_x = x - x.mean(axis=-1, keepdims=True)
     away_y = y - y.mean(axis=-1, keepdims=True)
@@ -38,7 +38,7 @@ def fit_line(x: Array, y: Array) -> FittedLine:
 
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
-    """Least-squares factor a of y = a * shape, along one axis."""
+    """Least-squares factor a of `y` = a * `shape`, along the axis `axis`."""
     # all other regressions of the article have this form; the shape is 1/T_x^2, D^3, cos^4(phi), rho^2, D or rho
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
@@ -53,7 +53,7 @@ class End(NamedTuple):
 
     @classmethod
     def at_angle(cls, chord: float) -> End:
-        """End of a chord, from its length [m], at the article's angle."""
+        """End of a chord of the length `chord` [m], at the article's angle."""
         return cls(chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE)))
 
     @property
@@ -78,7 +78,7 @@ class Sampling(NamedTuple):
         return sl.Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), chord_tension, GRAVITY)
 
     def between(self, lowest: float, highest: float) -> Sampling:
-        """The same sampling, with its tensions evenly spaced between two limits."""
+        """The same sampling, with tensions evenly spaced from `lowest` to `highest` [N]."""
         return self._replace(tensions=np.linspace(lowest, highest, self.tensions.size))
 
 

@@ -90,15 +90,15 @@ class TenPoses:
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
     def height_slope(self, error: Array) -> float:
-        """Change of the vertical error with the height of the pose [mm/m], from errors (10, 3) [m]."""
+        """Slope of the vertical part of `error` (10, 3) [m] over the height of the poses [mm/m]."""
         return float(fit_line(self.table.desired[:, 2], 1e3 * error[:, 2]).slope)
 
     def best(self, count: int) -> Explanation:
-        """Explanation with the smallest remaining error for a number of parameters."""
+        """Explanation by `count` parameters that has the smallest remaining error."""
         return self.explanations[count - 1][0]
 
     def explanation(self, *names: str) -> Explanation:
-        """The explanation that has the parameters with these names."""
+        """The explanation by the parameters with the names `names`."""
         return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
 
 
