@@ -57,31 +57,21 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
 
 def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
     """Sentences about readings that seem to have another unit, judged by their size in all rows of the log."""
-    size = _extent(robot)
+    frame, platform = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (robot.frame_anchors, robot.platform_anchors))
+    size = frame + platform + (0.0 if robot.winches is None else float(robot.winches.dead_cable.max()))
+    across, step = f"and the robot is {size:.3g} m across", "divide them by 1000, or write their unit"
     if log.unstrained_length is not None and log.unstrained_length.size:
         typical = float(np.nanmedian(log.unstrained_length)) if not np.isnan(log.unstrained_length).all() else 0.0
         if typical > UNIT * size:
-            yield (
-                f"lengths seem to be in mm: about {typical:.4g} m, and the robot is {size:.3g} m across; divide "
-                "them by 1000, or write their unit, length_0 [mm]"
-            )
+            yield f"lengths seem to be in mm: about {typical:.4g} m, {across}; {step}, length_0 [mm]"
     if log.position is not None and (far := _spread(log.position)) > UNIT * size:
-        yield (
-            f"positions seem to be in mm: they differ by {far:.4g} m, and the robot is {size:.3g} m across; divide "
-            "them by 1000, or write their unit, x [mm]"
-        )
+        yield f"positions seem to be in mm: they differ by {far:.4g} m, {across}; {step}, x [mm]"
     if log.commanded is not None and (far := _spread(log.commanded.position)) > UNIT * size:
-        yield (
-            f"commanded positions seem to be in mm: they differ by {far:.4g} m, and the robot is {size:.3g} m "
-            "across; divide them by 1000, or write their unit, x_commanded [mm]"
-        )
+        yield f"commanded positions seem to be in mm: they differ by {far:.4g} m, {across}; {step}, x_commanded [mm]"
     for name in ("length_deviation", "position_deviation"):
         deviation = getattr(log.sensors, name)
         if deviation is not None and (worst := float(np.max(deviation))) * ROUGH > size:
-            yield (
-                f"the {name} seems to be in mm: it is {worst:.3g} m, and the robot is {size:.3g} m across; write its "
-                f"unit, {name}: 0.5 mm"
-            )
+            yield f"the {name} seems to be in mm: it is {worst:.3g} m, {across}; write its unit, {name}: 0.5 mm"
     if log.load_cells is None or np.isnan(log.load_cells).all():
         return
     gain, bias = load_cells_of(robot)
@@ -118,13 +108,6 @@ def measured_pose_mistakes(
     sentence = _left_handed(*points) or _frame_mismatch(log, left_out, asked, points)
     if sentence is not None:
         yield sentence
-
-
-def _extent(robot: Robot) -> float:
-    """Size of the frame plus size of the platform [m]."""
-    frame, platform = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (robot.frame_anchors, robot.platform_anchors))
-    behind = 0.0 if robot.winches is None else float(robot.winches.dead_cable.max())
-    return frame + platform + behind
 
 
 def _spread(position: Array) -> float:
@@ -204,10 +187,8 @@ def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
 
 def _usual(trial: Trial) -> Array:
     """Typical lengths of the cables [m]: distances between the anchors, because lengths depend on the zeros."""
-    middle = trial.robot.frame_anchors.mean(axis=0) if trial.log.commanded is None else None
-    if middle is None and trial.log.commanded is not None:
-        middle = np.median(trial.log.commanded.position, axis=0)
-    assert middle is not None
+    commanded = trial.log.commanded
+    middle = trial.robot.frame_anchors.mean(axis=0) if commanded is None else np.median(commanded.position, axis=0)
     return np.asarray(np.linalg.norm(trial.robot.frame_anchors - middle, axis=1))
 
 

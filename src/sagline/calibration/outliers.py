@@ -166,9 +166,15 @@ def outliers_in(
 
 
 def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
+    """Outliers at a pose; the quantity of a whole pose is the kind of reading with the largest error."""
     m = case.lengths.shape[1]
     whole = _fit_suspects(case, (), 1)
-    suspects = _suspects(m, case.read)
+    cells = np.flatnonzero(case.read[:m]).tolist()
+    suspects = [_Suspect("length", cable, np.array([cable])) for cable in range(m)]
+    suspects += [_Suspect("load cell", cable, np.array([m + cable])) for cable in cells]
+    for quantity, first in (("position", m), ("rotation", m + 3)):
+        if (own := np.flatnonzero(case.read[first : first + 3])).size:
+            suspects.append(_Suspect(quantity, None, m + first + own))
     taken: list[_Suspect] = []
     before = whole.squares
     for _ in range(_MOST):
@@ -200,7 +206,11 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         if enough:
             each = zip(taken, fits[best].sizes, fits[best].deviations, strict=True)
             return [Outlier(row, one.cable, one.quantity, size, many) for one, size, many in each]
-    return [_whole(case, row, whole.squares)]
+    off, _ = case.misses()
+    parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))
+    worst = int(np.argmax([float(np.nansum((off[part] / case.deviation[part]) ** 2)) for part in parts]))
+    size = float(np.sqrt(np.nansum(off[parts[worst]] ** 2)))
+    return [Outlier(row, None, QUANTITIES[worst], size, float(np.sqrt(whole.squares)))]
 
 
 def _limit(there: Flags, taken: Sequence[_Suspect], count: int) -> float:
@@ -215,25 +225,3 @@ def _rarity(before: float, after: _SuspectFit, suspect: _Suspect) -> float:
     if drop < _DROP:
         return float(np.log(chdtrc(len(suspect.which), drop)))
     return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # asymptote of the tail
-
-
-def _suspects(m: int, there: Flags) -> list[_Suspect]:
-    """All lengths and readings of a pose as suspects."""
-    found = [_Suspect("length", cable, np.array([cable])) for cable in range(m)]
-    found += [_Suspect("load cell", cable, np.array([m + cable])) for cable in range(m) if there[cable]]
-    for quantity, first in (("position", m), ("rotation", m + 3)):
-        if (own := np.flatnonzero(there[first : first + 3])).size:
-            found.append(_Suspect(quantity, None, m + first + own))
-    return found
-
-
-def _whole(case: _Case, row: int, squares: float) -> Outlier:
-    """Outlier for the whole pose; its quantity is the kind of reading with the largest error."""
-    m = case.lengths.shape[1]
-    off, _ = case.misses()
-    parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))
-    shares = [float(np.nansum((off[part] / case.deviation[part]) ** 2)) for part in parts]
-    worst = int(np.argmax(shares))
-    return Outlier(
-        row, None, QUANTITIES[worst], float(np.sqrt(np.nansum(off[parts[worst]] ** 2))), float(np.sqrt(squares))
-    )

@@ -227,11 +227,9 @@ def _is_shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
     if unknown.shared is None:
         return kind.shared and alike
     if unknown.shared and kind.each and not alike:
-        allowed, step = (
-            "equal, with the same deviation, for all cables",
-            "Leave shared out; each cable then has its own value.",
-        )
-        raise InvalidValueError(f"unknown: {unknown.name}", "shared", f"{allowed} if shared", step)
+        allowed = "equal, with the same deviation, for all cables if shared"
+        step = "Leave shared out; each cable then has its own value."
+        raise InvalidValueError(f"unknown: {unknown.name}", "shared", allowed, step)
     return unknown.shared
 
 

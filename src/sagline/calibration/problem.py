@@ -48,7 +48,7 @@ def readings_table(log: WinchLog) -> ReadingsTable:
     """Readings of a log with NaN in place of missing columns."""
     count, m = log.readings.shape
     columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
-    tables = (np.full((count, width), np.nan) if read is None else read for read, width in columns)
+    tables = (np.broadcast_to(np.nan, (count, width)) if read is None else read for read, width in columns)
     return ReadingsTable(log.counts, log.unstrained_length, *tables)
 
 
