@@ -94,7 +94,7 @@ def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) 
     if log.load_cells is None or (log.position is None and log.rotation is None):
         return False
     own = log.replace(position=None, rotation=None)
-    return Trial(robot, model, own, np.arange(len(log))).result(Hypothesis()).quality <= GOOD
+    return Trial(robot, model, own, np.arange(len(log))).result(Hypothesis())[0] <= GOOD
 
 
 def measured_pose_mistakes(
@@ -121,33 +121,33 @@ def _spread(position: Array) -> float:
 
 def _single_mistake(trial: Trial) -> Iterator[str]:
     """Sentence about a single mistake; its correction gives a fit."""
-    whole = trial.result(Hypothesis())
-    far = _far(trial, whole.zeros)
-    if whole.quality <= GOOD:
+    before, departure, zeros = trial.result(Hypothesis())
+    far = _far(trial, zeros)
+    if before <= GOOD:
         if far.any():
-            yield _zero_text(whole.zeros, far)
-        elif whole.departure > NEAR:
-            yield from _other_unit(trial, whole.departure)
+            yield _zero_text(zeros, far)
+        elif departure > NEAR:
+            yield from _other_unit(trial, departure)
         return
-    enough = max(GOOD, min(POOR, 0.01 * whole.quality))
+    enough = max(GOOD, min(POOR, 0.01 * before))
     for changes, steps in ((_length_changes(trial), 0), (_load_cell_changes(trial), 1)):
         for change in trial.most_promising(changes, steps, _FULLY):
-            found = trial.result(change)
-            if found.quality > enough or found.departure > NEAR:
+            after, departure, zeros = trial.result(change)
+            if after > enough or departure > NEAR:
                 continue
             if change.moved:
-                yield _zero_text(found.zeros, _far(trial, found.zeros))
+                yield _zero_text(zeros, _far(trial, zeros))
             else:
-                before, after = _misfit_text(whole.quality), _misfit_text(found.quality)
-                yield f"{_change_text(change, trial.log)} (misfit {before}, then {after})"
+                text = _change_text(change, trial.log)
+                yield f"{text} (misfit {_misfit_text(before)}, then {_misfit_text(after)})"
             return
 
 
 def _other_unit(trial: Trial, departure: float) -> Iterator[str]:
     """Sentence about another unit of load cells with a smaller departure of the fit from the priors."""
     for unit in CELL_UNITS:
-        found = trial.result(Hypothesis(cell_unit=unit))
-        if unit and found.quality <= GOOD and found.departure < min(NEAR, 0.5 * departure):
+        quality, nearer, _ = trial.result(Hypothesis(cell_unit=unit))
+        if unit and quality <= GOOD and nearer < min(NEAR, 0.5 * departure):
             yield _change_text(Hypothesis(cell_unit=unit), trial.log)
             return
 

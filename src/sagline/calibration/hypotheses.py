@@ -54,16 +54,6 @@ class Hypothesis(NamedTuple):
     length_unit: str = ""  # unit of the lengths in `LENGTH_UNITS`; "" for meters
 
 
-class _TrialResult(NamedTuple):
-    """Fit of the readings after a change."""
-
-    # median over the rows of the sum of squares per reading: 1 if a robot fits within the deviations of the sensors,
-    # infinite if none fits
-    quality: float
-    departure: float  # mean square of the distance of the parameters from their priors, in prior deviations
-    zeros: Array  # errors of the zeros of the lengths [m], (m,)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
     """Tests of possible changes of a log.
@@ -82,18 +72,23 @@ class Trial:
     rows: Indices
     found: dict[tuple[Hypothesis, int], Pose] = field(default_factory=dict)
 
-    def result(self, change: Hypothesis) -> _TrialResult:
-        """Fit of a similar robot to the changed readings."""
+    def result(self, change: Hypothesis) -> tuple[float, float, Array]:
+        """Fit of a similar robot to the changed readings: quality, departure, and errors of the zeros [m], (m,).
+
+        The quality is the median over the rows of the sum of squares per reading: 1 if a robot fits within the
+        deviations of the sensors, infinite if none fits. The departure is the mean square of the distance of the
+        parameters from their priors, in prior deviations.
+        """
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
         except (ValueError, np.linalg.LinAlgError):  # the search diverges with such readings
-            return _TrialResult(np.inf, np.inf, moved)
+            return np.inf, np.inf, moved
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
         zeros = np.array([name == "length_zero" for name in problem.parameters.names])
         departure = float(np.mean((off / problem.prior_deviation) ** 2))
-        return _TrialResult(quality, departure, moved + off[zeros])
+        return quality, departure, moved + off[zeros]
 
     def promise(self, change: Hypothesis, steps: int) -> float:
         """Predicted sum of squares per row after `steps` + 1 least-squares steps; infinite without a fit."""

@@ -75,9 +75,12 @@ def gauge_of(
     found = [_direction(*_largest(unit[index], parameters), frame) for index in alone]
     frame = frame._replace(free=np.setdiff1d(frame.free, alone))
     left = _open_directions(triangle, frame)
-    known = symmetries(robot, sensors, _rotation_of_frame(parameters, values), counted=parameters.counted)
-    known = known._replace(matters=known.matters & ~np.isin(parameters.where, alone))
-    vectors, named = _symmetric_part(left, frame, parameters.where, known)
+    where = parameters.where[_TURN, 0]
+    turn = np.where(where >= 0, values[where], 0.0)  # rotation of the measuring system [rad]; zero if it is known
+    each, table, lengths, matters = symmetries(robot, sensors, turn, counted=parameters.counted)
+    matters &= ~np.isin(parameters.where, alone)
+    admissible = _admissible_symmetries(frame, parameters.where, table, lengths, matters)
+    vectors, named = _symmetric_part(left, *admissible, each)
     found += [_direction(name, vector, step, frame) for vector, (name, step) in zip(vectors.T, named, strict=True)]
     fit_suspects = np.linalg.qr(vectors)[0]
     rest = left - fit_suspects @ (fit_suspects.T @ left)
@@ -87,12 +90,6 @@ def gauge_of(
     return tuple(found)
 
 
-def _rotation_of_frame(parameters: Parameters, values: Array) -> Array:
-    """Rotation vector of the measuring system, if it is estimated [rad], (3,); zero if it is known."""
-    where = parameters.where[_TURN, 0]
-    return np.where(where >= 0, values[where], 0.0)
-
-
 def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direction:
     unit = vector / np.linalg.norm(vector)
     unit = unit * np.sign(unit[np.argmax(np.abs(unit))])
@@ -100,31 +97,33 @@ def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direct
 
 
 def _symmetric_part(
-    left: Array, frame: PriorUnits, where: Indices, known: Symmetries
+    left: Array, vectors: Array, shares: Array, each: Sequence[Generator]
 ) -> tuple[Array, list[tuple[str, str]]]:
-    """Symmetries within the span of the unobservable directions (P, d), with names and steps."""
-    vectors, shares = _admissible_symmetries(frame, where, known)
+    """Admissible symmetries within the span of the unobservable directions (P, d), with names and steps."""
+    shares = shares[: len(each)]
     if not vectors.shape[1] or not left.shape[1]:
-        return np.zeros((len(frame.scale), 0)), []
+        return left[:, :0], []
     basis, upper = np.linalg.qr(vectors)
     _, sines, turned = np.linalg.svd(basis - left @ (left.T @ basis), full_matrices=False)
     inside = np.linalg.solve(upper, turned[sines < _SAME].T)  # directions that are symmetries and unobservable
     mixed = _echelon((shares @ inside).T).T
     found = vectors @ np.linalg.lstsq(shares, mixed, rcond=None)[0]
-    return found, [_named(column, known.each) for column in mixed.T]
+    return found, [_named(column, each) for column in mixed.T]
 
 
-def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries) -> tuple[Array, Array]:
+def _admissible_symmetries(
+    frame: PriorUnits, where: Indices, table: Array, lengths: Array, matters: Flags
+) -> tuple[Array, Array]:
     """Combinations of symmetries that change only unknowns: vectors (P, k), and coefficients of the symmetries (g, k).
 
     Both are in standard deviations. Known values do not change, and values that all cables share change equally. Zeros
     and radii of the drums change so that the drums pay out the required lengths.
     """
     free = np.isin(where, frame.free)
-    conditions = [known.table[known.matters & ~free], known.lengths]
-    single = np.zeros((len(frame.scale), known.table.shape[-1]))
+    conditions = [table[matters & ~free], lengths]
+    single = np.zeros((len(frame.scale), table.shape[-1]))
     for index in frame.free:
-        same = known.table[where == index]
+        same = table[where == index]
         conditions.append(same[1:] - same[0])
         single[index] = same[0] / frame.scale[index]
     condition = np.vstack(conditions)
@@ -133,7 +132,7 @@ def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries)
     _, size, rows = np.linalg.svd(vectors, full_matrices=False)
     kept = rows[size > _SAME * max(size.max(initial=0.0), _TINY)].T
     shares = np.linalg.norm(single, axis=0)[:, None] * (combined @ kept)
-    return vectors @ kept, shares[: len(known.each)]
+    return vectors @ kept, shares
 
 
 def _null(matrix: Array) -> Array:
@@ -239,15 +238,6 @@ class Generator(NamedTuple):
     lengths: float = 0.0  # relative change of the lengths off the drums
 
 
-class Symmetries(NamedTuple):
-    """The g symmetries of a robot, including changes of the zeros and radii of its drums."""
-
-    each: tuple[Generator, ...]  # symmetries with a name; the columns of the drums follow after these
-    table: Array  # change of every row of `kinds`, (KIND_ROWS, m, g)
-    lengths: Array  # lengths that the drums pay out minus required lengths, (2 m, g); a combination must make them zero
-    matters: Flags  # True for parameters that a symmetry must not change if they are known, (KIND_ROWS, m)
-
-
 def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generator]:
     """Symmetries with a name; turn: rotation vector of the measuring system [rad], (3,)."""
     m, winches, center, place = robot.cable_count, robot.winches, robot.center_of_mass, sensors.frame.position
@@ -289,8 +279,16 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
         yield generator(f"the world shifted along {axis}", _WORLD, ([kinds.FRAME + k, kinds.SHIFT + k], 1.0))
 
 
-def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) -> Symmetries:
-    """Symmetries of a robot and its sensors; turn: rotation vector of the measuring system [rad], (3,)."""
+def symmetries(
+    robot: Robot, sensors: Sensors, turn: Array, *, counted: bool
+) -> tuple[tuple[Generator, ...], Array, Array, Flags]:
+    """Symmetries of a robot and its sensors, including changes of the zeros and radii of its drums.
+
+    turn: rotation vector of the measuring system [rad], (3,). Returns the symmetries with a name (the columns of the
+    drums follow after these); the change of every row of `kinds`, (KIND_ROWS, m, g); the lengths that the drums pay out
+    minus required lengths, (2 m, g), which a combination must make zero; and True for parameters that a symmetry must
+    not change if they are known, (KIND_ROWS, m).
+    """
     m, each = robot.cable_count, tuple(_generators(robot, sensors, turn))
     drums = np.zeros((kinds.KIND_ROWS, m, 2 * m))
     drums[kinds.ZERO, np.arange(m), np.arange(m)] = 1.0
@@ -306,7 +304,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
         matters[[kinds.GAIN, kinds.BIAS]] = False
     if not robot.freedom[:, 3:].any():  # without rotations, the center of mass has no effect
         matters[_CENTER] = False
-    return Symmetries(each, table, np.concatenate((shift, share - asked)), matters)
+    return each, table, np.concatenate((shift, share - asked)), matters
 
 
 def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:

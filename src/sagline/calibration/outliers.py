@@ -9,18 +9,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import chdtrc, gammaln
 
+from sagline.calibration import observations
 from sagline.calibration.findings import QUANTITIES, Outlier
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
-from sagline.calibration.observations import (
-    EXACT,
-    NO_LOAD,
-    SLOPES,
-    MachineTerms,
-    machine_of,
-    unit_sensors,
-    whitened_rows,
-)
 from sagline.calibration.parameters import Unknown, parameters_of
 from sagline.calibration.problem import FitProblem, SearchState
 from sagline.core.arrays import Array, Flags, Indices, locked
@@ -59,7 +51,7 @@ class _SuspectFit(NamedTuple):
 class _Case(NamedTuple):
     """One pose of the log."""
 
-    machine: MachineTerms  # the robot with sensors in SI units
+    machine: observations.MachineTerms  # the robot with sensors in SI units
     deviation: Array  # standard deviations of lengths and readings, (2 m + 6,)
     readings: PoseReadings  # readings at the pose, one row
     pose: Array  # pose row, (1, POSE_COLUMNS)
@@ -68,10 +60,10 @@ class _Case(NamedTuple):
 
     def misses(self) -> tuple[Array, Array]:
         """Reported minus true lengths, and readings minus predictions, (2 m + 6,); slopes by length, (m + 6, m)."""
-        slopes = np.zeros((SLOPES, 1, self.lengths.shape[1]))
-        rows = whitened_rows(self.machine, self.readings, slopes, self.pose, self.lengths)
+        slopes = np.zeros((observations.SLOPES, 1, self.lengths.shape[1]))
+        rows = observations.whitened_rows(self.machine, self.readings, slopes, self.pose, self.lengths)
         off = np.concatenate((self.readings.lengths[0] - self.lengths[0], rows.residual[0]))
-        return off, rows.back[0].T / EXACT**2
+        return off, rows.back[0].T / observations.EXACT**2
 
 
 def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _SuspectFit:
@@ -125,7 +117,7 @@ def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Cas
         lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
         if (lengths <= 0.0).any():
             continue
-        found = solve_forward_rows(robot, model, locked(lengths), locked(case.pose.copy()), NO_LOAD)
+        found = solve_forward_rows(robot, model, locked(lengths), locked(case.pose.copy()), observations.NO_LOAD)
         if found.stable[0]:
             new = case._replace(pose=found.poses, lengths=lengths)
             if np.sum((new.misses()[0] / new.deviation)[counts] ** 2) < squares:
@@ -153,9 +145,9 @@ def outliers_in(
     reported = problem.reported_lengths(machine)
     deviation = reading_deviations(machine.sensors, m)
     read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3]))) & np.isfinite(deviation[m:])
-    exact = unit_sensors(machine.sensors)
+    exact = observations.unit_sensors(machine.sensors)
     parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), exact, counted=False)  # not used
-    exactly = machine_of(machine.robot, problem.model, parameters, exact, np.zeros(m))
+    exactly = observations.machine_of(machine.robot, problem.model, parameters, exact, np.zeros(m))
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)
@@ -183,9 +175,8 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         near_best = np.array(rough) < min(rough) + _WORTH
         close = [suspects[k] for k in np.flatnonzero(near_best)]
         fits = [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
-        if min(fit.squares for fit in fits) > _limit(
-            case.read, (*taken, close[0]), count
-        ):  # no suspect explains the readings, possibly because the linear fits were inaccurate
+        # no suspect explains the readings, possibly because the linear fits were inaccurate
+        if min(fit.squares for fit in fits) > _limit(case.read, (*taken, close[0]), count):
             likely = ~near_best & (np.array([fit.squares for fit in first]) < _NONLINEAR * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
             fits += [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in more]

@@ -211,7 +211,7 @@ def drum_tension(state: Equilibrium) -> Array:
     """
     robot, cables = state.one_robot, state.cables
     if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
-        return locked(actual_routing(state).drum_tension)
+        return locked(actual_routing(state)[-1])
     if cables.model.code != CATENARY:
         return state.chord_tension
     height = robot.frame_anchors[:, 2]

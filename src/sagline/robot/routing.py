@@ -12,7 +12,7 @@ The tension of its far end follows from T + T^2/(2 EA) - w z, which is constant 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -35,12 +35,9 @@ _STEP: Final = 1e-6  # relative step of the tension for its numerical derivative
 _TINY: Final = 1e-300
 
 
-class _Routing(NamedTuple):
-    """Results for the cables between exit points and drums, arrays of shape (N, m)."""
-
-    wrapped: Array  # unstrained length on the pulleys [m]
-    dead: Array  # unstrained length between pulleys and drums [m]; NaN if the cable is too slack for a catenary
-    drum_tension: Array  # tension at the drums [N]
+# Unstrained length of the cables on the pulleys [m]; their unstrained length between pulleys and drums [m], NaN if a
+# cable is too slack for a catenary; and their tension at the drums [N]; all (N, m)
+_Routing: TypeAlias = tuple[Array, Array, Array]
 
 
 class _ExitState(NamedTuple):
@@ -85,8 +82,8 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
     kept = None if winding is None else locked(np.array(np.broadcast_to(winding, state.cables.shape)))
     contact = replace(state.contact, winding=kept)
     if differs(state.robot, kept):
-        real = actual_routing(replace(state, contact=contact))
-        contact = replace(contact, wrapped_length=locked(real.wrapped), dead_length=locked(real.dead))
+        wrapped, dead, _ = actual_routing(replace(state, contact=contact))
+        contact = replace(contact, wrapped_length=locked(wrapped), dead_length=locked(dead))
     return replace(state, contact=contact)
 
 
@@ -96,8 +93,8 @@ def kernel_length(state: Equilibrium) -> Array:
     if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
         return state.unstrained_length
     plain = replace(state, contact=replace(contact, winding=None))
-    modeled = _routing(plain, guided=True)
-    return locked(state.free_length + (modeled.wrapped + modeled.dead))
+    wrapped, dead, _ = _routing(plain, guided=True)
+    return locked(state.free_length + (wrapped + dead))
 
 
 def actual_routing(state: Equilibrium) -> _Routing:
@@ -110,19 +107,20 @@ def _routing(state: Equilibrium, *, guided: bool) -> _Routing:
     if isinstance(state.robot, Robot):
         return _routing_of_robot(state, state.robot, guided=guided)
     parts = [_routing_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
-    return _Routing(*(np.stack(each) for each in zip(*parts, strict=True)))
+    wrapped, dead, tension = (np.stack(each) for each in zip(*parts, strict=True))
+    return wrapped, dead, tension
 
 
 def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Routing:
     contact, winches, shape = state.contact, robot.winches, state.cables.shape
     assert contact is not None
     if winches is None or not winches.anything_behind:
-        return _Routing(np.zeros(shape), np.zeros(shape), _exit_tension(state))
+        return np.zeros(shape), np.zeros(shape), _exit_tension(state)
     # a cable that does not stretch has the same length with and without friction
     if state.cables.model.code == codes.STRAIGHT:
         dead = np.broadcast_to(winches.dead_cable, shape)
-        return _Routing(winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state))
-    found = _Routing(*(np.full(shape, np.nan) for _ in _Routing._fields))
+        return winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state)
+    found = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
     known = np.isfinite(_exit_tension(state))
     if not known.any():
         return found
