@@ -163,9 +163,8 @@ def _refuse(sentences: Iterable[str]) -> None:
     for sentence in sentences:
         what, _, step = sentence.partition("; " if "; " in sentence else ": ")
         step = f"{step[:1].upper()}{step[1:]}."
-        raise InvalidValueError(
-            "log", f"inconsistent with this robot: {what}", "readings that fit this robot, or a similar one", step
-        )
+        value, allowed = f"inconsistent with this robot: {what}", "readings that fit this robot, or a similar one"
+        raise InvalidValueError("log", value, allowed, step)
 
 
 def _check_count(log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices], *, freely: bool) -> None:

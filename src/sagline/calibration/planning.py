@@ -92,7 +92,38 @@ class CalibrationPoses(Result, Saved):
 
 def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
     """Expected errors of calibration poses and of random poses, in lines of at most `width` columns."""
-    return "\n".join((*_head(plan, width), *_errors(plan, width), *_advice(plan, width))).replace(SPACE, " ")
+    position, read, share = plan.poses.position, plan.sensors, plan.share_of_random
+    places = position[np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1)))]  # without repetitions
+    way = n(tour_length(places, np.arange(len(places))), ".3g", "m")
+    what = f"{counted(len(plan), 'pose')} to find {counted(len(plan.parameters.names), 'number')} of {plan.robot.name}"
+    sensors = (
+        ("lengths", read.length_deviation, "m"),
+        ("load cells", read.tension_deviation, "N"),
+        ("positions", read.position_deviation, "m"),
+        ("rotations", read.rotation_deviation, "rad"),
+    )
+    texts = [
+        f"{words} ({information.error_text(float(np.max(deviation)), unit)})"
+        for words, deviation, unit in sensors
+        if deviation is not None
+    ]
+    if plan.enough < len(plan):
+        enough = f"With {counted(plan.enough, 'pose')}, an additional pose reduces no error by more than 1{SPACE}%."
+    else:
+        enough = f"More poses still help: an additional pose reduces an error by more than 1{SPACE}%."
+    lines = [
+        *wrap(f"{what}: {counted(len(places), 'place')}, {way} to drive", width),
+        *wrap(f"read by {' and '.join(texts)}", width, initial_indent="  ", subsequent_indent="  "),
+        *_errors(plan, width),
+        *wrap(
+            f"In the observable directions, the errors are {n(share, '.2f')} times the errors of random poses. "
+            f"{n(share**-2, '.2g')} times as many random poses have the same errors.",
+            width,
+        ),
+        *wrap(enough, width),
+        *wrap(plan.most_helpful, width),
+    ]
+    return "\n".join(lines).replace(SPACE, " ")
 
 
 def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
@@ -127,31 +158,6 @@ def _column(head: str, values: Iterable[float], decimals: int) -> list[str]:
     return [f"{cell:>{width}}" for cell in cells]
 
 
-def _head(plan: CalibrationPoses, width: int) -> Iterator[str]:
-    places = plan.poses.position[_first_of_each(plan.poses.position)]
-    way = n(tour_length(places, np.arange(len(places))), ".3g", "m")
-    what = f"{counted(len(plan), 'pose')} to find {counted(len(plan.parameters.names), 'number')} of {plan.robot.name}"
-    yield from wrap(f"{what}: {counted(len(places), 'place')}, {way} to drive", width)
-    yield from wrap(f"read by {' and '.join(_sensors(plan))}", width, initial_indent="  ", subsequent_indent="  ")
-
-
-def _first_of_each(position: Array) -> Array:
-    """Flags of the poses with another position than the previous pose."""
-    return np.asarray(np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1))))
-
-
-def _sensors(plan: CalibrationPoses) -> Iterator[str]:
-    read = plan.sensors
-    for words, deviation, unit in (
-        ("lengths", read.length_deviation, "m"),
-        ("load cells", read.tension_deviation, "N"),
-        ("positions", read.position_deviation, "m"),
-        ("rotations", read.rotation_deviation, "rad"),
-    ):
-        if deviation is not None:
-            yield f"{words} ({information.error_text(float(np.max(deviation)), unit)})"
-
-
 def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
     """Lines with the root mean square errors of each kind."""
     names = np.array(plan.parameters.names)
@@ -168,21 +174,6 @@ def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
             )
             cells = zip((mine.sum(), before, after, usual), others, strict=True)
             yield f"  {name:<{first}}" + "".join(f"{cell:>{own}}" for cell, own in cells)
-
-
-def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
-    share, times = plan.share_of_random, plan.share_of_random**-2
-    yield from wrap(
-        f"In the observable directions, the errors are {n(share, '.2f')} times the errors of random poses. "
-        f"{n(times, '.2g')} times as many random poses have the same errors.",
-        width,
-    )
-    if plan.enough < len(plan):
-        text = f"With {counted(plan.enough, 'pose')}, an additional pose reduces no error by more than 1{SPACE}%."
-    else:
-        text = f"More poses still help: an additional pose reduces an error by more than 1{SPACE}%."
-    yield from wrap(text, width)
-    yield from wrap(plan.most_helpful, width)
 
 
 MOST: Final = 1_000  # largest number of poses; more take days to measure

@@ -90,9 +90,8 @@ def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **li
     """Check that the array `value` has exactly the shape `shape`. Batch axes are not allowed."""
     array = checked(value, item, unit, **limits)
     if array.shape != shape:
-        raise InvalidValueError(
-            item, f"of shape {array.shape}", f"shape {shape}" if shape else "a single number", f"Reshape {item}."
-        )
+        allowed = f"shape {shape}" if shape else "a single number"
+        raise InvalidValueError(item, f"of shape {array.shape}", allowed, f"Reshape {item}.")
     return array
 
 
@@ -164,9 +163,8 @@ def _from_other_kind(given: NDArray[Any], item: str) -> Array:
     shown = next((entry for entry in given.flat if not _is_real(entry)), given) if given.dtype.kind == "O" else given
     kind = _KINDS.get(given.dtype.kind, "")
     value = f"{kind}: {_listed(shown)}" if kind else _listed(shown)
-    raise InvalidValueError(
-        item, value, "numbers, not complex" if kind else "numbers", f"Give {item} as plain numbers."
-    )
+    allowed = "numbers, not complex" if kind else "numbers"
+    raise InvalidValueError(item, value, allowed, f"Give {item} as plain numbers.")
 
 
 def _listed(value: object) -> str:
@@ -195,9 +193,8 @@ def _check_shape(array: Array, item: str, shape: tuple[int | None, ...]) -> None
     trailing = array.shape[array.ndim - len(shape) :] if array.ndim >= len(shape) else None
     if trailing is None or any(want is not None and want != have for want, have in zip(shape, trailing, strict=True)):
         wanted = ", ".join("any" if n is None else str(n) for n in shape)
-        raise InvalidValueError(
-            item, f"of shape {array.shape}", f"shape (..., {wanted})", f"Reshape {item} so that its last axes fit."
-        )
+        step = f"Reshape {item} so that its last axes fit."
+        raise InvalidValueError(item, f"of shape {array.shape}", f"shape (..., {wanted})", step)
 
 
 def _check_range(
@@ -221,9 +218,5 @@ def _check_range(
         size.replace("  ", " ").rstrip() if beyond[index] else "",
         "" if infinite else "finite",
     ]
-    raise InvalidValueError(
-        where,
-        f"{array[index]:g} {unit}".rstrip(),
-        ", ".join(b for b in bounds if b) or "a number",
-        f"Correct {where}.",
-    )
+    allowed = ", ".join(b for b in bounds if b) or "a number"
+    raise InvalidValueError(where, f"{array[index]:g} {unit}".rstrip(), allowed, f"Correct {where}.")

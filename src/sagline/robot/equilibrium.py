@@ -135,12 +135,8 @@ class Equilibrium(Result, Tabular):
         """
         if isinstance(self.robot, Robot):
             return self.robot
-        raise InvalidValueError(
-            "robot",
-            f"a sequence of {len(self.robot)} robots, one per pose",
-            "one robot for all poses",
-            "Select a single pose: state[i].",
-        )
+        value = f"a sequence of {len(self.robot)} robots, one per pose"
+        raise InvalidValueError("robot", value, "one robot for all poses", "Select a single pose: state[i].")
 
     def __len__(self) -> int:
         """Number of poses in a batch."""

@@ -190,9 +190,8 @@ class Pose:
             raise _counts_differ("position and rotation", shapes) from None
         check_memory("pose", 56.0 * math.prod(shape), "Give fewer poses.")
         if len(shape) > 1:
-            raise InvalidValueError(
-                "pose", f"a batch of shape {shape}", "one pose, or a batch of shape (N,)", "Flatten the leading axes."
-            )
+            allowed, step = "one pose, or a batch of shape (N,)", "Flatten the leading axes."
+            raise InvalidValueError("pose", f"a batch of shape {shape}", allowed, step)
         for name, array in (("position", position), ("quaternion", unit(quaternion))):
             whole = np.ascontiguousarray(np.broadcast_to(array, (*shape, array.shape[-1])))
             object.__setattr__(self, name, locked(whole))
@@ -314,16 +313,10 @@ def _refuse(wrong: NDArray[np.bool_], item: str, measure: str, values: Array, al
         return
     index = tuple(int(i) for i in np.argwhere(wrong)[0])
     where = item if not index else f"{item} {index[0]}"
-    raise InvalidValueError(
-        f"{where}: {measure}",
-        f"{values[index]:.12g}",
-        allowed,
-        "Build it with scipy's Rotation, which checks the matrix.",
-    )
+    step = "Build it with scipy's Rotation, which checks the matrix."
+    raise InvalidValueError(f"{where}: {measure}", f"{values[index]:.12g}", allowed, step)
 
 
 def _counts_differ(item: str, shapes: list[tuple[int, ...]]) -> InvalidValueError:
-    counts = " and ".join(str(shape) for shape in shapes)
-    return InvalidValueError(
-        item, f"of batch shapes {counts}", "equal counts, or a single pose", "Give one value for each pose."
-    )
+    value, allowed = f"of batch shapes {' and '.join(map(str, shapes))}", "equal counts, or a single pose"
+    return InvalidValueError(item, value, allowed, "Give one value for each pose.")

@@ -68,9 +68,8 @@ def deviations(
         array = checked(value, label, what.unit, low=low, above=above, infinite=True)
         if array.shape not in ((), shape, shape[-1:] if what.axes else ()):
             ways = " or ".join(str(way) for way in dict.fromkeys(((), shape[-1:] if what.axes else (), shape)))
-            raise InvalidValueError(
-                label, f"of shape {array.shape}", f"shape {ways}", "Give one value for all, or one value per entry."
-            )
+            step = "Give one value for all, or one value per entry."
+            raise InvalidValueError(label, f"of shape {array.shape}", f"shape {ways}", step)
         found[name] = locked(np.array(np.broadcast_to(array, shape)))
     return MappingProxyType(found)
 
@@ -89,9 +88,8 @@ def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
     array = checked(share, item, "%")
     if array.shape not in ((), value.shape):
-        raise InvalidValueError(
-            item, f"of shape {array.shape}", f"shape () or {value.shape}", "Give one value for all."
-        )
+        allowed = f"shape () or {value.shape}"
+        raise InvalidValueError(item, f"of shape {array.shape}", allowed, "Give one value for all.")
     return np.asarray(array * np.abs(value))
 
 
