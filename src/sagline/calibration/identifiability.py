@@ -85,9 +85,9 @@ def gauge_of(
     fit_suspects = np.linalg.qr(vectors)[0]
     rest = left - fit_suspects @ (fit_suspects.T @ left)
     basis, size, _ = np.linalg.svd(rest, full_matrices=False)
-    for vector in _sparse(basis[:, size > 0.5]).T:
-        found.append(_direction(*_largest(vector, parameters), frame))
-    return tuple(found)
+    basis = basis[:, size > 0.5]
+    rows = _echelon(basis.T) if basis.size else basis.T
+    return (*found, *(_direction(*_largest(vector, parameters), frame) for vector in rows))
 
 
 def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direction:
@@ -143,7 +143,7 @@ def _null(matrix: Array) -> Array:
 
 
 def _echelon(rows: Array) -> Array:
-    """Reduced row echelon form."""
+    """Reduced row echelon form: a sparse basis of the span of the rows."""
     rows = rows.copy()
     lead = 0
     for column in range(rows.shape[1]):
@@ -167,11 +167,6 @@ def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
     first = taken[0]
     also = [one.name for one in taken[1:] if "shifted" not in one.name]
     return " and ".join([first.name, *also]), first.step
-
-
-def _sparse(basis: Array) -> Array:
-    """Sparse basis of the span of some columns, as columns."""
-    return _echelon(basis.T).T if basis.size else basis
 
 
 def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:

@@ -186,8 +186,13 @@ class WinchLog(_Replaceable, Saved, Tabular):
                 table = _table(value, name, unit_, n, columns)
                 object.__setattr__(self, name, _quaternions(table) if name == "rotation" else table)
         if self.time is not None:
-            object.__setattr__(self, "time", _times(self.time, n))
-        _check_poses(optional(self.commanded, Pose, "commanded"), n)
+            time = checked(self.time, "time", "s")
+            if time.shape != (n,):
+                raise InvalidValueError("time", f"of shape {time.shape}", f"shape ({n},)", "Give one per row.")
+            object.__setattr__(self, "time", time)
+        if (pose := optional(self.commanded, Pose, "commanded")) is not None and pose.shape != (n,):
+            value = f"a batch of {len(pose)}" if pose.shape else "a single pose"
+            raise InvalidValueError("commanded", value, f"a batch of {n}", "Give one per row of the log.")
         instance(self.sensors, Sensors, "sensors")
         object.__setattr__(self, "source", text(self.source, "source"))
         _check_sensors(self, m)
@@ -275,19 +280,6 @@ def _quaternions(given: Array) -> Array:
     found = np.full(given.shape, np.nan)
     found[whole] = unit(given[whole])
     return locked(found)
-
-
-def _times(value: ArrayLike, rows: int) -> Array:
-    time = checked(value, "time", "s")
-    if time.shape != (rows,):
-        raise InvalidValueError("time", f"of shape {time.shape}", f"shape ({rows},)", "Give one per row.")
-    return time
-
-
-def _check_poses(pose: Pose | None, rows: int) -> None:
-    if pose is not None and pose.shape != (rows,):
-        value = f"a batch of {len(pose)}" if pose.shape else "a single pose"
-        raise InvalidValueError("commanded", value, f"a batch of {rows}", "Give one per row of the log.")
 
 
 def _check_sensors(log: WinchLog, cables: int) -> None:

@@ -181,12 +181,8 @@ def _is_within(array: Array, *, low: float, above: float) -> bool:
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())
-    return smallest >= max(low, -LARGEST) and smallest > above and largest <= LARGEST and not _too_near(smallest, above)
-
-
-def _too_near(value: float, above: float) -> bool:
-    """True if a value that must be positive is too small to divide by."""
-    return above == 0.0 and 0.0 < value < SMALLEST
+    tiny = above == 0.0 and 0.0 < smallest < SMALLEST  # too small to divide by
+    return smallest >= max(low, -LARGEST) and smallest > above and largest <= LARGEST and not tiny
 
 
 def _check_shape(array: Array, item: str, shape: tuple[int | None, ...]) -> None:

@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.cable import Cable
-from sagline.core.arguments import instance, optional
+from sagline.core.arguments import instance
 from sagline.core.arrays import SMALLEST, Array, checked, exactly, locked, refuse_first
 from sagline.core.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import unit
-from sagline.robot.winch import Winch
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
 # tolerance for moments with three digits: the largest moment of a thin plate equals the sum of the other two
@@ -56,12 +55,6 @@ def cables(given: Cable, count: int) -> Cable:
     density = fields["linear_density"]
     refuse_first(density == 0.0, "cables: linear_density", np.abs(density), "kg/m", "> 0 kg/m", step)
     return given if given.linear_density.shape == (count,) else given.replace(**fields)
-
-
-def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
-    """The winches, one per cable, or None. Guides determine the dead lengths up to the frame anchors (m, 3)."""
-    winch = optional(given, Winch, "winches")
-    return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:

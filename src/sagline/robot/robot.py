@@ -108,6 +108,7 @@ class Robot(Shown):
         pattern = choice(self.motion_pattern, "motion_pattern", MOTION_PATTERNS)
         normal = checks.plane_normal(self.plane_normal, pattern)
         lower, upper = checks.limits_of_each_cable(self.tension_min, self.tension_max, len(frame))
+        winches = optional(self.winches, Winch, "winches")
         calibration = optional(self.calibration, Provenance, "calibration")
         set_fields(
             self,
@@ -115,7 +116,7 @@ class Robot(Shown):
             frame_anchors=frame,
             platform_anchors=platform,
             cables=checks.cables(self.cables, len(frame)),
-            winches=checks.winch_of_each_cable(self.winches, frame),
+            winches=None if winches is None else winches.per_cable(len(frame))._run_to(frame),
             mass=number(self.mass, "mass", "kg", above=0.0),
             inertia=checks.inertia(self.inertia, pattern, normal),
             center_of_mass=exactly(self.center_of_mass, "center_of_mass", "m", (3,)),
