@@ -1,6 +1,5 @@
 """Calibrations of known robots: correct values and correct standard errors."""
 
-import sys
 from functools import cache
 from typing import NamedTuple
 
@@ -9,7 +8,7 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError
-from sagline.calibration import search
+from sagline.calibration import diagnostics, search
 from sagline.calibration.parameters import parameters_of
 from sagline.core.arrays import Array
 from tests.calibration.synthetic import (
@@ -348,7 +347,7 @@ def test_an_invalid_unknown_is_refused_before_any_work(monkeypatch: pytest.Monke
     def work(*_: object) -> None:
         raise AssertionError("it has begun")
 
-    monkeypatch.setattr(sys.modules[sl.calibrate.__module__], "wrong_units", work)
+    monkeypatch.setattr(diagnostics, "wrong_units", work)
     robot = sl.load_robot("cogiro")
     log = sl.WinchLog(
         unstrained_length=np.full((3, 8), 9.0),
