@@ -20,7 +20,7 @@ from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import TensionLimits, fill_admissible_tensions, is_limited_by_strain
-from sagline.kernels.cable.terms import Cables, Model
+from sagline.kernels.cable.terms import Cables, Model, material_at
 from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 
@@ -312,19 +312,12 @@ def place_platform(
 def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Array, cables: Cables) -> bool:
     """Fill chords, material, first-order sag forces and admissible tensions. False if a cable has no chord."""
     for i in range(robot.shape[0]):
-        chord, sine = geometry[g.CHORD, i], geometry[g.SINE, i]
+        chord = geometry[g.CHORD, i]
         if not chord >= SHORTEST_CHORD:
             return False
-        cables.chord[i] = chord
-        cables.sine[i] = sine
-        cables.cosine[i] = geometry[g.COSINE, i]
-        cables.density[i] = robot[i, tables.DENSITY]
-        cables.stiffness[i] = robot[i, tables.STIFFNESS]
-        behind = pulley_at(robot, i)
-        cables.radius[i] = behind.radius
-        cables.entry[i] = behind.entry
-        cables.dead[i] = behind.dead
-        cables.rise[i] = behind.rise
+        cables.chord[i], cables.sine[i], cables.cosine[i] = chord, geometry[g.SINE, i], geometry[g.COSINE, i]
+        cables.density[i], cables.stiffness[i] = material_at(robot, i)
+        cables.radius[i], cables.entry[i], cables.dead[i], cables.rise[i] = pulley_at(robot, i)
         cables.half_weight[i] = 0.5 * robot[i, tables.DENSITY] * model.gravity * chord
         cables.sag_force[i] = shallow_sag_force(model, chord, robot[i, tables.DENSITY])
         low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]

@@ -256,8 +256,7 @@ def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
 def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
     """Fill the point (d,) within all bounds (up to `slack`) that is nearest to `target` (d,). False if none exists.
 
-    held: active sides of a similar problem, or labels[0] = 0 if there is none. They are overwritten with the active
-        sides of the point.
+    held: active sides of a similar problem, or labels[0] = 0; overwritten with the active sides of the point.
     """
     labels, frame, triangle, pushes = held
     d = target.size

@@ -194,11 +194,7 @@ def largest_sags(terms: Terms, cables: States, sag_out: Array) -> None:
 
 @entry
 def closures(terms: Terms, cables: States, residual_out: Array) -> None:
-    """Error of each cable in the equations of its model [m].
-
-    For a catenary, the error is the distance between computed end and platform end; for other models, the error of the
-    length.
-    """
+    """Error of each cable in the equations of its model [m]: of a catenary's platform end, or of the length."""
     model = model_of(terms)
     span, rise, density, stiffness, length, horizontal, vertical, tension = cables
     for i in range(residual_out.shape[0]):

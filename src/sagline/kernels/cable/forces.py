@@ -13,7 +13,6 @@ and no branches, so that it vectorizes.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
@@ -92,8 +91,7 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
 def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
     """Fill forces and free spans from the equivalent cables. Returns the largest error, relative to the cable length.
 
-    This error corrects the equivalent cables in the next pass. For the exact cable it is the error of the platform end,
-    and for the shallow cables it is the error of the length.
+    It is the error of the platform end of an exact cable, and of the length of a shallow cable.
     """
     if model.code == codes.CATENARY:
         _exit_points_from_forces(model, cables, rows)
@@ -285,30 +283,26 @@ def _square_share(part: float, length: float) -> float:
     return ratio * ratio
 
 
-class _EquivalentCables(NamedTuple):
-    """Data of the cables to solve, m values each: span, rise and unstrained length [m], EA [N]."""
-
-    span: Array
-    rise: Array
-    length: Array
-    stiffness: Array
+# data of the cables to solve, m values each: span, rise and unstrained length [m], EA [N]
+_EquivalentCables = tuple[Array, Array, Array, Array]
 
 
 @glue
 def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
     """Two Halley steps for every cable from the stored parameter. The loop has one result, so that it vectorizes."""
     m = cables.shape[0]
+    span, rise, length, stiffness = asked
     for i in range(m):
-        rows[g.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
+        rows[g.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * length[i] / stiffness[i]
     for i in range(m):
-        rows[g.EXCESS, i] = relative_excess(asked.span[i], asked.rise[i], asked.length[i])
+        rows[g.EXCESS, i] = relative_excess(span[i], rise[i], length[i])
     for i in range(m):
-        xi2 = _square_share(asked.span[i], asked.length[i])
-        zeta2 = _square_share(asked.rise[i], asked.length[i])
+        xi2 = _square_share(span[i], length[i])
+        zeta2 = _square_share(rise[i], length[i])
         rows[g.FIRST, i] = _halley_step(rows[g.PARAMETER, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
     for i in range(m):
-        xi2 = _square_share(asked.span[i], asked.length[i])
-        zeta2 = _square_share(asked.rise[i], asked.length[i])
+        xi2 = _square_share(span[i], length[i])
+        zeta2 = _square_share(rise[i], length[i])
         rows[g.SECOND, i] = _halley_step(rows[g.FIRST, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
 
 
@@ -327,10 +321,10 @@ def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool |
     `behind` is `Model.behind` as a separate argument. If it is None, the code for pulleys is not compiled.
     """
     if behind is None:
-        bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])
+        bare = (rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])
         _solve_equivalent_cables(model, cables, bare, rows)
     else:
-        asked = _EquivalentCables(rows[g.ASKED_SPAN], rows[g.ASKED_RISE], rows[g.ASKED_LENGTH], rows[g.SOFT])
+        asked = (rows[g.ASKED_SPAN], rows[g.ASKED_RISE], rows[g.ASKED_LENGTH], rows[g.SOFT])
         start_passes(cables, rows)
         missed = math.inf
         for _ in range(PASSES):
@@ -348,10 +342,11 @@ def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool |
 def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
     """Fill T_x, T_z, tau and status of the cables given by `asked`."""
     exact = model.code == codes.CATENARY
+    spans, rises, lengths, stiffness = asked
     if exact:
         _two_halley_steps(model.gravity, cables, asked, rows)
     for i in range(cables.shape[0]):
-        span, rise, length = asked.span[i], asked.rise[i], asked.length[i]
+        span, rise, length = spans[i], rises[i], lengths[i]
         chord = math.sqrt(span * span + rise * rise)
         density = cables[i, tables.DENSITY]
         weight = density * model.gravity
@@ -366,10 +361,8 @@ def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCabl
             rows[g.STATUS, i] = codes.CABLE_SOLVED
             rows[g.PARAMETER, i] = h
             continue
-        force, status = from_length(model, span, rise, Material(density, asked.stiffness[i]), length)
-        rows[g.HORIZONTAL, i] = force.horizontal
-        rows[g.VERTICAL, i] = force.vertical
-        rows[g.TENSION, i] = force.tension
+        force, status = from_length(model, span, rise, Material(density, stiffness[i]), length)
+        rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], rows[g.TENSION, i] = force
         rows[g.STATUS, i] = status
         # h from tau = wD/(2 (h + kappa)), for the next pose
         h = 0.5 * weight * chord / force.tension - rows[g.KAPPA, i] if force.tension > 0.0 else math.nan

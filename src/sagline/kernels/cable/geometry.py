@@ -71,18 +71,12 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
         geometry[AZIMUTH_Y, i] = dy / span if span > 0.0 else 0.0
         if cables[i, tables.PULLEY_RADIUS] > 0.0:
             chord, sine, cosine = tangent(cables[i, tables.PULLEY_RADIUS], cables[i, tables.ENTRY], span, dz)
-            geometry[SPAN, i] = chord * cosine
-            geometry[RISE, i] = chord * sine
-            geometry[CHORD, i] = chord
-            geometry[SINE, i] = sine
-            geometry[COSINE, i] = cosine
+            span, dz = chord * cosine, chord * sine
         else:
             chord = math.sqrt(span * span + dz * dz)
-            geometry[SPAN, i] = span
-            geometry[RISE, i] = dz
-            geometry[CHORD, i] = chord
-            geometry[SINE, i] = dz / chord
-            geometry[COSINE, i] = span / chord
+            sine, cosine = dz / chord, span / chord
+        geometry[SPAN, i], geometry[RISE, i] = span, dz
+        geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i] = chord, sine, cosine
         bx -= body[tables.CENTER_X]
         by -= body[tables.CENTER_Y]
         bz -= body[tables.CENTER_Z]

@@ -18,6 +18,9 @@ from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model, PlaneVector, Pulley
 from sagline.kernels.jit import formula, kernel
 
+# changes of the parameters of one cable: L [m], w [N/m], EA [N], R [m], dead length [m]
+Change = tuple[float, float, float, float, float]
+
 LEAST_TURNED = -0.8  # smallest derivative in a Newton step; a derivative near -1 would turn the cable too far
 
 
@@ -27,16 +30,6 @@ class Wrap(NamedTuple):
     sine: float
     cosine: float
     angle: float
-
-
-class Change(NamedTuple):
-    """Changes of the parameters of one cable: L [m], w [N/m], EA [N], R [m], dead length [m]."""
-
-    length: float
-    weight: float
-    stiffness: float
-    radius: float
-    dead: float
 
 
 @formula
@@ -168,6 +161,7 @@ def _length_behind_by(
     the parameters (the length has no effect here); grown: increase of the free span's unstrained length.
     """
     radius, entry, dead, rise = pulley
+    _length, weight_by, stiffness_by, radius_by, dead_change = change
     vertical_a = force.vertical - weight * free
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
     sine, cosine = force.horizontal / tension, entry * vertical_a / tension
@@ -175,21 +169,21 @@ def _length_behind_by(
     strained, first, last = _strains(pulley, weight, stiffness, tension, sine)
     cube = strained * strained * strained
     beta = weight * radius / stiffness
-    vertical_by = -(free * change.weight + weight * grown)
+    vertical_by = -(free * weight_by + weight * grown)
     angle_by = -entry * sine / tension * vertical_by
-    strained_by = (entry * cosine * vertical_by - (strained - 1.0) * change.stiffness) / stiffness
-    beta_by = (change.weight * radius + weight * change.radius - beta * change.stiffness) / stiffness
+    strained_by = (entry * cosine * vertical_by - (strained - 1.0) * stiffness_by) / stiffness
+    beta_by = (weight_by * radius + weight * radius_by - beta * stiffness_by) / stiffness
     falls = 1.0 - cosine - wrapped * sine
     per_radius = wrapped / strained - entry * beta * falls / cube
-    wrapped_by = change.radius * per_radius + radius * (
+    wrapped_by = radius_by * per_radius + radius * (
         angle_by * (1.0 / strained + entry * beta * wrapped * cosine / cube)
         - strained_by * (wrapped / (strained * strained) - 3.0 * entry * beta * falls / (cube * strained))
         - entry * falls * beta_by / cube
     )
     first_by = (strained * strained_by - entry * (beta_by * sine + beta * cosine * angle_by)) / first
-    last_by = (first * first_by - rise * (change.weight - weight * change.stiffness / stiffness) / stiffness) / last
+    last_by = (first * first_by - rise * (weight_by - weight * stiffness_by / stiffness) / stiffness) / last
     total = first + last
-    dead_by = 2.0 * (change.dead - dead * (first_by + last_by) / total) / total
+    dead_by = 2.0 * (dead_change - dead * (first_by + last_by) / total) / total
     return angle_by, wrapped_by + dead_by
 
 
@@ -201,20 +195,21 @@ def end_by(
 
     by_weight: motion per change of w at a fixed free length [m^2/N].
     """
+    length_by, weight_by, stiffness_by, radius_by, _dead = change
     vertical_a = force.vertical - weight * free
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
     along_x, along_z = force.horizontal / tension, vertical_a / tension
     strained = 1.0 + tension / material.stiffness
     still = _length_behind_by(pulley, weight, material.stiffness, force, free, change, 0.0)[1]
     more = _length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
-    grown = (change.length - still) / (1.0 + more)
+    grown = (length_by - still) / (1.0 + more)
     turned = _length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
     # cable is added to the free span at P, where its stretch is E_A, and P moves along the tangent
     feed = strained * grown + pulley.radius * turned
-    softer = -free * change.stiffness / (material.stiffness * material.stiffness)
-    x = softer * force.horizontal + by_weight.x * change.weight
-    z = softer * (force.vertical - 0.5 * weight * free) + by_weight.z * change.weight
+    softer = -free * stiffness_by / (material.stiffness * material.stiffness)
+    x = softer * force.horizontal + by_weight.x * weight_by
+    z = softer * (force.vertical - 0.5 * weight * free) + by_weight.z * weight_by
     return PlaneVector(
-        x + feed * along_x + change.radius * (1.0 - pulley.entry * along_z),
-        z + feed * along_z + change.radius * pulley.entry * along_x,
+        x + feed * along_x + radius_by * (1.0 - pulley.entry * along_z),
+        z + feed * along_z + radius_by * pulley.entry * along_x,
     )

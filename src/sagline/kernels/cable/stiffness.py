@@ -17,7 +17,7 @@ from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import across_pulley, energy_over, stiffness_in_series
 from sagline.kernels.cable.models import sag_of_shallow, shallow_sag_force, slack_series, stretching_tension
-from sagline.kernels.cable.pulley import Change, end_by
+from sagline.kernels.cable.pulley import end_by
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness, PlaneVector, Pulley, material_at
 from sagline.kernels.jit import formula, kernel
 
@@ -178,10 +178,7 @@ def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool 
         if behind is not None:
             plane = stiffness_in_series(model, cables, rows, i, plane)
             rows[g.ACROSS, i] = across_pulley(cables, rows, i)
-        rows[g.XX, i] = plane.xx
-        rows[g.XZ, i] = plane.xz
-        rows[g.ZX, i] = plane.zx
-        rows[g.ZZ, i] = plane.zz
+        rows[g.XX, i], rows[g.XZ, i], rows[g.ZX, i], rows[g.ZZ, i] = plane
 
 
 @formula
@@ -365,11 +362,11 @@ def slopes_over(
     if force.horizontal == 0.0 and force.vertical == weight * free:  # there is no force at P
         return _ForceSlopes(none, none, none, none, none)
     heavier = model.gravity if weight > 0.0 else 0.0
-    length = end_by(pulley, material, weight, force, free, Change(1.0, 0.0, 0.0, 0.0, 0.0), by_weight)
-    density = end_by(pulley, material, weight, force, free, Change(0.0, heavier, 0.0, 0.0, 0.0), by_weight)
-    stiffness = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 1.0, 0.0, 0.0), by_weight)
-    radius = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 1.0, 0.0), by_weight)
-    dead = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 0.0, 1.0), by_weight)
+    length = end_by(pulley, material, weight, force, free, (1.0, 0.0, 0.0, 0.0, 0.0), by_weight)
+    density = end_by(pulley, material, weight, force, free, (0.0, heavier, 0.0, 0.0, 0.0), by_weight)
+    stiffness = end_by(pulley, material, weight, force, free, (0.0, 0.0, 1.0, 0.0, 0.0), by_weight)
+    radius = end_by(pulley, material, weight, force, free, (0.0, 0.0, 0.0, 1.0, 0.0), by_weight)
+    dead = end_by(pulley, material, weight, force, free, (0.0, 0.0, 0.0, 0.0, 1.0), by_weight)
     return _ForceSlopes(
         force_change(plane, length),
         force_change(plane, density),

@@ -293,11 +293,11 @@ def fit_poses(
         copy(pose, answer.poses[p])
         if fitted:
             copy(pose, start)
-        for i in range(m):
-            answer.results[tables.SPAN, p, i] = space.rows[g.SPAN, i]
-            answer.results[tables.RISE, p, i] = space.rows[g.RISE, i]
-            answer.results[tables.LENGTH, p, i] = batch.lengths[p, i]
-            if answer.results.shape[0] > tables.BARE_ROWS:
+        copy(space.rows[g.SPAN], answer.results[tables.SPAN, p])
+        copy(space.rows[g.RISE], answer.results[tables.RISE, p])
+        copy(batch.lengths[p], answer.results[tables.LENGTH, p])
+        if answer.results.shape[0] > tables.BARE_ROWS:
+            for i in range(m):
                 pulley, chord = pulley_at(problem.cables, i), chord_at(space.rows, i)
                 sine, cosine = chord.cosine, pulley.entry * chord.sine
                 wrap = Wrap(sine, cosine, angle(sine, cosine))

@@ -90,13 +90,12 @@ def decide_poses(
         else:
             statuses[p] = codes.CABLE_SOLVED
         pose_statuses[p] = status
+        farkas[p] = reliefs[p] = math.nan
         for k in range(n):
             supplied = demand.right[k]
             for i in range(m):
                 supplied += demand.hanging[k, i] * change.sag_force[i]
             needed[p, k] = supplied if k < translations else supplied * lever
-            farkas[p, k] = math.nan
-            reliefs[p, k] = math.nan
             if status != codes.POSE_SOLVED and brackets[p, ENOUGH] < math.inf:
                 reliefs[p, k] = change.residual[k] if k < translations else 0.0
         if status == codes.POSE_INFEASIBLE and proved:

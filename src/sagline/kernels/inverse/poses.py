@@ -313,34 +313,33 @@ def write_solution(
 def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
     """Write the free spans. Add the cable on the pulleys and the dead lengths to the unstrained lengths."""
     m = cables.tau.size
+    if not solved:
+        results[tables.WRAP, p] = results[tables.WRAPPED, p] = math.nan
+        results[tables.DEAD, p] = results[tables.SINE, p] = math.nan
+        return
+    # memory for the exit points of the cables, because the previous sag forces are no longer needed
+    tension = cables.last_sag_force
+    copy(cables.tau, tension)
+    if model.code == codes.CATENARY:
+        for i in range(m):
+            x, z = cables.free_tau[i] * cables.free_cosine[i], cables.free_tau[i] * cables.free_sine[i]
+            length = cables.ratio[i] * cables.free_chord[i]
+            z += cables.free_sag_force[i] - cables.density[i] * model.gravity * length
+            tension[i] = math.sqrt(x * x + z * z)
     for i in range(m):
-        if not solved:
-            results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = math.nan
-            results[tables.DEAD, p, i] = results[tables.SINE, p, i] = math.nan
-    if solved:
-        # memory for the exit points of the cables, because the previous sag forces are no longer needed
-        tension = cables.last_sag_force
-        copy(cables.tau, tension)
-        if model.code == codes.CATENARY:
-            for i in range(m):
-                x, z = cables.free_tau[i] * cables.free_cosine[i], cables.free_tau[i] * cables.free_sine[i]
-                length = cables.ratio[i] * cables.free_chord[i]
-                z += cables.free_sag_force[i] - cables.density[i] * model.gravity * length
-                tension[i] = math.sqrt(x * x + z * z)
-        for i in range(m):
-            results[tables.SPAN, p, i] = cables.free_chord[i] * cables.free_cosine[i]
-        for i in range(m):
-            results[tables.RISE, p, i] = cables.free_chord[i] * cables.free_sine[i]
-        for i in range(m):
-            results[tables.WRAP, p, i] = angle(cables.wrap_sine[i], cables.wrap_cosine[i])
-        for i in range(m):
-            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], results[tables.WRAP, p, i])
-            wrapped, _dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
-            results[tables.WRAPPED, p, i] = wrapped
-        for i in range(m):
-            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], 0.0)
-            _wrapped, dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
-            results[tables.DEAD, p, i] = dead
-        for i in range(m):
-            results[tables.LENGTH, p, i] += results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i]
-        copy(cables.sine, results[tables.SINE, p])
+        results[tables.SPAN, p, i] = cables.free_chord[i] * cables.free_cosine[i]
+    for i in range(m):
+        results[tables.RISE, p, i] = cables.free_chord[i] * cables.free_sine[i]
+    for i in range(m):
+        results[tables.WRAP, p, i] = angle(cables.wrap_sine[i], cables.wrap_cosine[i])
+    for i in range(m):
+        wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], results[tables.WRAP, p, i])
+        wrapped, _dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
+        results[tables.WRAPPED, p, i] = wrapped
+    for i in range(m):
+        wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], 0.0)
+        _wrapped, dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
+        results[tables.DEAD, p, i] = dead
+    for i in range(m):
+        results[tables.LENGTH, p, i] += results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i]
+    copy(cables.sine, results[tables.SINE, p])

@@ -40,10 +40,8 @@ def new_stability_arrays(memory: Memory, m: int, k: int) -> tuple[StabilityArray
     """Work arrays for m cables and k free rotations, and the remaining memory."""
     compliance, memory = vector(memory, m)
     torque, memory = block(memory, 3, 3)
-    geometric, memory = block(memory, k, k)
-    elastic, memory = block(memory, k, k)
-    proof, memory = block(memory, 2 * k, k)
-    return StabilityArrays(compliance, torque, geometric, elastic, proof), memory
+    squares, memory = block(memory, 4 * k, k)
+    return StabilityArrays(compliance, torque, squares[:k], squares[k : 2 * k], squares[2 * k :]), memory
 
 
 @glue
@@ -112,8 +110,7 @@ def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balan
 def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
     """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N].
 
-    The bounds are exact if there are no pulleys. They are infinite for deep sag, which is outside the range of the
-    polynomial.
+    They are exact without pulleys, and infinite for deep sag, which is outside the range of the polynomial.
     """
     for i in range(cables.tau.size):
         length = cables.ratio[i] * cables.free_chord[i]

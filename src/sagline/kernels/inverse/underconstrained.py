@@ -72,16 +72,14 @@ def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[Underco
     jacobian, memory = block(memory, n + m, n + m)
     step, memory = vector(memory, n + m)
     stiffness, memory = block(memory, 6, 6)
-    along, memory = vector(memory, m)
-    sag_force, memory = vector(memory, m)
+    vectors, memory = block(memory, 3, m)
     gram, memory = block(memory, m, m)
     work, memory = block(memory, m, m)
     motion, memory = vector(memory, 6)
     moved, memory = vector(memory, tables.POSE_COLUMNS)
-    tau, memory = vector(memory, m)
     given, memory = counters(memory, m)
     return UnderconstrainedArrays(
-        jacobian, step, stiffness, along, sag_force, gram, work, motion, moved, tau, given
+        jacobian, step, stiffness, vectors[0], vectors[1], gram, work, motion, moved, vectors[2], given
     ), memory
 
 
