@@ -1,4 +1,4 @@
-"""A workspace that is known: a ball about the origin, cut off by a wall, with a cable for each half."""
+"""A known workspace: a ball around the origin, cut by a wall, with one cable for each half."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A client without a browser: speaks viser's protocol over a bare websocket; and how to wait for what it asks."""
+"""A client without a browser that uses the protocol of viser over a plain websocket, and waits for conditions."""
 
 from __future__ import annotations
 

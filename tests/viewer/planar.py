@@ -1,4 +1,4 @@
-"""A robot that moves in an upright plane: four cables, two sides and a turn."""
+"""A robot that moves in a vertical plane: four cables, two translations and a rotation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forces on the platform from nothing but how the cables hang: their slopes at the platform, by finite differences."""
+"""Forces on the platform from the shapes of the cables only: slopes at the platform by finite differences."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Whether a page can be used by keys, and told by a screen reader: everything on it, whoever has added it."""
+"""Checks that a page can be used with keys and a screen reader, for all of its elements."""
 
 from pathlib import Path
 from typing import Final

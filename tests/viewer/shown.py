@@ -1,4 +1,4 @@
-"""A viewer that serves its page, without a browser: what the page says, what is in its scene, how often it is drawn."""
+"""A viewer that serves its page without a browser: texts of the page, scene, and update rate."""
 
 from __future__ import annotations
 

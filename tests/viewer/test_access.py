@@ -1,4 +1,4 @@
-"""Who is let in to the page: over real sockets, as browsers on pages of somebody else ask, and as others do."""
+"""Access to the page over real sockets, as by browsers on foreign pages and by other clients."""
 
 import http.client
 import json
@@ -55,7 +55,7 @@ def asked(server: PageServer, path: str, *hosts: str, **headers: str) -> tuple[i
 
 
 @BOTH
-def test_the_address_is_that_with_the_token(server: PageServer, extra: dict[str, str], served: int) -> None:
+def test_the_address_contains_the_token(server: PageServer, extra: dict[str, str], served: int) -> None:
     path = server.access.path
     assert len(path) > 20
     assert server.url == f"http://127.0.0.1:{server.get_port()}{path}"
@@ -87,7 +87,7 @@ def test_a_rebound_host_is_refused(server: PageServer, extra: dict[str, str], se
 
 
 @BOTH
-def test_a_page_of_somebody_else_is_refused(server: PageServer, extra: dict[str, str], served: int) -> None:
+def test_a_foreign_page_is_refused(server: PageServer, extra: dict[str, str], served: int) -> None:
     path = server.access.path
     assert asked(server, path, Origin="http://127.0.0.1:PORT", **extra)[0] == served
     others = (
@@ -101,9 +101,7 @@ def test_a_page_of_somebody_else_is_refused(server: PageServer, extra: dict[str,
 
 @BOTH
 @pytest.mark.parametrize("made", [{"token": False}], indirect=True)
-def test_without_a_token_hosts_and_origins_are_looked_at_all_the_same(
-    made: PageServer, extra: dict[str, str], served: int
-) -> None:
+def test_hosts_and_origins_are_checked_without_a_token(made: PageServer, extra: dict[str, str], served: int) -> None:
     assert made.url == f"http://127.0.0.1:{made.get_port()}"
     assert made.access.path_once() == ""
     assert asked(made, "/", **extra)[0] == served
@@ -115,7 +113,7 @@ def test_without_a_token_hosts_and_origins_are_looked_at_all_the_same(
 
 @BOTH
 @pytest.mark.parametrize("made", [{"allow_host": ["Lab.example", "::2"]}], indirect=True)
-def test_a_named_host_is_let_in_and_as_a_proxy_too(made: PageServer, extra: dict[str, str], served: int) -> None:
+def test_an_allowed_host_is_accepted_also_as_a_proxy(made: PageServer, extra: dict[str, str], served: int) -> None:
     path = made.access.path
     assert asked(made, path, "lab.example", Origin="https://lab.example", **extra)[0] == served
     assert asked(made, path, "[0:0::2]:80", **extra)[0] == served
@@ -126,7 +124,7 @@ def test_a_named_host_is_let_in_and_as_a_proxy_too(made: PageServer, extra: dict
 
 @BOTH
 @pytest.mark.parametrize("made", [{"host": "0.0.0.0"}], indirect=True)
-def test_on_all_addresses_any_address_is_let_in_and_the_name_of_the_computer(
+def test_on_all_addresses_any_address_and_the_host_name_are_accepted(
     made: PageServer, extra: dict[str, str], served: int
 ) -> None:
     assert made.url.startswith(f"http://localhost:{made.get_port()}/")
@@ -138,7 +136,7 @@ def test_on_all_addresses_any_address_is_let_in_and_the_name_of_the_computer(
 
 
 @pytest.mark.parametrize("wrong", [["http://lab.example"], ["lab.example:80"], [""], ["*"], "a b", [1], 1])
-def test_what_is_no_name_is_no_host_to_allow(wrong: Any) -> None:
+def test_invalid_host_names_are_refused(wrong: Any) -> None:
     with pytest.raises(sl.InvalidValueError, match="host"):
         start_server(port=0, allow_host=wrong)
     with refused("clients", "0", "1 to 1000", kind=sl.InvalidValueError):
@@ -198,7 +196,7 @@ def test_a_message_larger_than_any_of_the_page_ends_its_client(
     assert [str(access.LARGEST) in line for line in lines if line.startswith("Refused: ")] == [True]
 
 
-def test_the_largest_message_of_a_page_is_heard(made: PageServer) -> None:
+def test_the_largest_message_of_a_page_is_accepted(made: PageServer) -> None:
     channel, heard = Channel(made.gui, lambda task: task()), list[Any]()
     channel.on("test", lambda value, _: heard.append(value))
     text = "\U0001d11e" * (LONGEST - 40)
@@ -207,14 +205,14 @@ def test_the_largest_message_of_a_page_is_heard(made: PageServer) -> None:
         await_that(lambda: heard == [text])
 
 
-def test_a_request_without_end_is_no_request(server: PageServer) -> None:
+def test_an_endless_request_is_refused(server: PageServer) -> None:
     with pytest.raises((http.client.HTTPException, OSError)):
         asked(server, f"/{'x' * 20_000}")
     with pytest.raises((http.client.HTTPException, OSError)):
         asked(server, server.access.path, **{f"X-{k}": "x" for k in range(200)})
 
 
-def test_of_each_kind_of_refusal_a_line_is_printed_once_a_minute(
+def test_refusals_of_a_kind_are_printed_once_a_minute(
     made: PageServer, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for _ in range(3):
@@ -230,7 +228,7 @@ def test_of_each_kind_of_refusal_a_line_is_printed_once_a_minute(
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_a_viser_that_is_not_checked_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unsupported_version_of_viser_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(access.Access, "checked_serve", lambda _, *place, **options: serve(*place, **options))
     with refused("viser", viser.__version__, kind=sl.InvalidValueError):
         start_server(port=0)

@@ -1,4 +1,4 @@
-"""The page in headless Chromium: it loads, a slider changes it, a run plays, and the console does not complain."""
+"""The page in headless Chromium: it loads, a slider changes it, a run plays, and the console has no errors."""
 
 import threading
 import time
@@ -122,7 +122,7 @@ def box(page: Page, selector: str) -> FloatRect:
     return found
 
 
-def test_a_factor_changes_cables_and_numbers_and_is_undone_by_keys(browser: Browser) -> None:
+def test_a_factor_changes_the_page_and_keys_undo_it(browser: Browser) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, viewer):
         assert page.get_by_text("Natural frequencies").is_visible()
         field = page.get_by_role("spinbutton", name="Cable density")
@@ -176,7 +176,7 @@ def test_a_run_plays_in_the_page(browser: Browser) -> None:
         page.get_by_role("button", name="Play").wait_for()
 
 
-def test_the_scene_can_be_taken_away(browser: Browser, tmp_path: FilePath) -> None:
+def test_the_scene_can_be_exported(browser: Browser, tmp_path: FilePath) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, _):
         page.get_by_text("Export").click()
         with page.expect_download() as download:
@@ -211,7 +211,7 @@ def least_contrast(page: Page) -> float:
         pytest.param("dark", 1000, marks=pytest.mark.soak),
     ],
 )
-def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"], width: int) -> None:
+def test_all_text_is_readable(browser: Browser, theme: Literal["light", "dark"], width: int) -> None:
     robot = sl.load_robot("article-mixed")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
     run = PlayedPlan(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
@@ -280,7 +280,7 @@ def test_nothing_overflows_its_panel(browser: Browser, name: str) -> None:
         assert page.evaluate(OVERFLOWING) == []
 
 
-def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
+def test_a_clicked_frequency_is_animated(browser: Browser) -> None:
     with opened(browser, sl.load_robot("article-suspended")) as (page, viewer):
         page.get_by_role("tab", name="Modes").click()
         page.locator("tr[data-send='mode'][data-value='2']").click()
@@ -310,7 +310,7 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         await_that(page, lambda: not viewer.feature(ModesFeature).moving)
 
 
-def test_the_modes_can_be_read_in_the_light_and_in_the_dark_on_a_small_screen(browser: Browser) -> None:
+def test_the_modes_are_readable_in_both_themes_on_a_small_screen(browser: Browser) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, _):
         page.get_by_role("tab", name="Modes").click()
         page.locator("tr[data-send='mode'][data-value='1']").click()
@@ -342,7 +342,7 @@ def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize(("theme", "width"), [("dark", 390), ("light", 1000), ("light", 390), ("dark", 1000)])
-def test_a_calibration_can_be_read_and_its_rows_be_clicked(
+def test_a_calibration_is_readable_and_its_rows_can_be_clicked(
     browser: Browser, theme: Literal["light", "dark"], width: int
 ) -> None:
     found = made_up(count=20)

@@ -1,4 +1,4 @@
-"""What balances the platform, in headless Chromium: the dot by mouse, finger and keys, and the way back to balance."""
+"""Balance of the platform in headless Chromium: the dot by mouse, finger and keys, and infeasible poses."""
 
 from collections.abc import Iterator
 
@@ -66,7 +66,7 @@ def brought_into_sight(page: Page) -> None:
 
 
 @pytest.mark.parametrize(("name", "screen"), on_all_screens(("falcon-7", (390, 640))))
-def test_the_dot_is_dragged_stepped_and_put_back(browser: Browser, name: str, screen: tuple[int, int]) -> None:
+def test_the_dot_is_dragged_stepped_and_reset(browser: Browser, name: str, screen: tuple[int, int]) -> None:
     with opened(browser, sl.load_robot(name), width=screen[0]) as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
         if name == "fast":
@@ -122,7 +122,7 @@ def test_a_finger_drags_the_dot(browser: Browser, name: str) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize(("name", "screen"), on_all_screens())
-def test_a_pose_that_cannot_be_held_leads_to_one_that_can(browser: Browser, name: str, screen: tuple[int, int]) -> None:
+def test_an_infeasible_pose_leads_to_a_feasible_one(browser: Browser, name: str, screen: tuple[int, int]) -> None:
     robot = sl.load_robot(name)
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     with opened(browser, robot, width=screen[0]) as (page, viewer):
@@ -141,7 +141,7 @@ def test_a_pose_that_cannot_be_held_leads_to_one_that_can(browser: Browser, name
 
 @pytest.mark.soak
 @pytest.mark.parametrize(("name", "screen"), on_all_screens())
-def test_the_proof_is_read_and_drawn(browser: Browser, name: str, screen: tuple[int, int]) -> None:
+def test_the_proof_is_shown_and_drawn(browser: Browser, name: str, screen: tuple[int, int]) -> None:
     with opened(browser, sl.load_robot(name), width=screen[0], theme="dark") as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
         page.get_by_role("tab", name="Proof").click()

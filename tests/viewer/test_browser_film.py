@@ -1,4 +1,4 @@
-"""Films and pictures for paper, as files that headless Chromium makes and that are read again."""
+"""Films and pictures for paper, made by headless Chromium and read again."""
 
 import base64
 from collections.abc import Iterator
@@ -130,7 +130,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
 
 
 @pytest.mark.soak
-def test_a_browser_without_an_encoder_records_the_film_as_it_is_shown(
+def test_a_browser_without_an_encoder_records_the_film_in_real_time(
     browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(export, "RATE", 0.5)
@@ -148,7 +148,7 @@ def test_a_browser_without_an_encoder_records_the_film_as_it_is_shown(
     assert np.abs(last[976:, 1500:] - first[976:, 1500:]).max() > 64.0  # the clock
 
 
-def test_a_picture_is_as_large_as_paper_without_gizmo_and_names(browser: Browser, tmp_path: FilePath) -> None:
+def test_a_picture_has_the_size_of_paper_without_gizmo_and_names(browser: Browser, tmp_path: FilePath) -> None:
     robot = sl.load_robot("article-suspended")
     with opened(browser, robot, width=1200) as (page, _):
         page.get_by_text("Export").click()

@@ -1,4 +1,4 @@
-"""A pose typed, lines copied, a link followed, and pages that are refused, in headless Chromium."""
+"""Typed poses, copied lines, links, and refused pages in headless Chromium."""
 
 from collections.abc import Iterator
 from threading import Thread
@@ -26,7 +26,7 @@ def browser() -> Iterator[Browser]:
     yield from launched(FLAGS)
 
 
-def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
+def test_a_pose_is_typed_and_linked(browser: Browser) -> None:
     with opened(browser, sl.load_robot("falcon-7"), complains=True) as (page, viewer):
 
         def place() -> np.ndarray:
@@ -85,7 +85,7 @@ INTRUDING = """async (address) => {
 }"""
 
 
-def test_a_page_of_somebody_else_is_refused_even_with_the_token(browser: Browser) -> None:
+def test_a_foreign_page_is_refused_even_with_the_token(browser: Browser) -> None:
     server = start_server(port=0, clients=1)
     other = start_server(port=0, token=False)
     try:
@@ -104,7 +104,7 @@ def test_a_page_of_somebody_else_is_refused_even_with_the_token(browser: Browser
         stop_server(other)
 
 
-def test_the_page_connects_to_its_own_server_alone_and_shows_why_it_may_not(browser: Browser) -> None:
+def test_the_page_connects_only_to_its_server_and_shows_refusals(browser: Browser) -> None:
     server = start_server(port=0, clients=1)
     viewer = ViewerPage(server, FEATURES, sl.load_robot("falcon-7"))
     thread = Thread(target=viewer.serve)

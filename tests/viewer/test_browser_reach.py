@@ -1,4 +1,4 @@
-"""The page without a mouse and without eyes: every control is reached and named, the verdict is said, keys move."""
+"""The page without mouse and screen: all controls are reached and named, the verdict is announced, keys move."""
 
 import time
 from collections.abc import Iterator
@@ -112,7 +112,7 @@ def keys_move(page: Page, viewer: ViewerPage) -> None:
     field.press("Escape")
 
 
-def test_all_is_reached_named_and_said(browser: Browser) -> None:
+def test_all_controls_are_reached_named_and_announced(browser: Browser) -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
     run = PlayedPlan(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
@@ -131,7 +131,7 @@ def test_all_is_reached_named_and_said(browser: Browser) -> None:
         walk(page)
 
 
-def test_rules_find_what_is_wrong(browser: Browser) -> None:
+def test_the_rules_find_violations(browser: Browser) -> None:
     page = browser.new_page()
     page.set_default_timeout(1e3 * PATIENCE)
     page.set_content(
@@ -158,7 +158,7 @@ def test_rules_find_what_is_wrong(browser: Browser) -> None:
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_any_robot_at_any_size(
+def test_any_robot_at_any_screen_size(
     browser: Browser, name: str, size: tuple[int, int], theme: Literal["light", "dark"]
 ) -> None:
     with opened(browser, sl.load_robot(name), width=size[0], theme=theme) as (page, viewer):

@@ -1,4 +1,4 @@
-"""The region in headless Chromium, by a real mouse: it follows a slider, its wall lights up, and all of it is read."""
+"""The region in headless Chromium with a real mouse: it follows a slider, and its near side is highlighted."""
 
 from collections.abc import Iterator
 from io import BytesIO
@@ -73,7 +73,9 @@ def near_the_wall(viewer: ViewerPage) -> np.ndarray:
         for screen in SCREENS
     ],
 )
-def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, screen: tuple[int, int]) -> None:
+def test_a_region_follows_a_slider_and_its_near_side_is_highlighted(
+    browser: Browser, name: str, screen: tuple[int, int]
+) -> None:
     with opened(browser, sl.load_robot(name), width=screen[0], theme="dark") as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
         show = viewer.feature(RegionFeature)

@@ -1,4 +1,4 @@
-"""The timeline in headless Chromium with a real mouse: what it says is in the data, a drag on it moves the robot."""
+"""The timeline in headless Chromium with a real mouse: its values are the data, and a drag moves the robot."""
 
 import re
 from collections.abc import Iterator
@@ -93,7 +93,7 @@ def scrubbed(page: Page, viewer: ViewerPage, run: PlayedPlan) -> None:
     assert page.evaluate(OVERFLOWING) == []
 
 
-def test_the_timeline_is_pointed_at_and_scrubbed(browser: Browser) -> None:
+def test_the_timeline_shows_values_and_is_scrubbed(browser: Browser) -> None:
     run = run_of(sl.load_robot("falcon-7"))
     with opened(browser, run.robot, run) as (page, viewer):
         scrubbed(page, viewer, run)
@@ -103,7 +103,7 @@ def test_the_timeline_is_pointed_at_and_scrubbed(browser: Browser) -> None:
 @pytest.mark.parametrize("theme", THEMES)
 @pytest.mark.parametrize(("width", "height"), SIZES)
 @pytest.mark.parametrize("name", ROBOTS)
-def test_so_on_every_screen(
+def test_the_timeline_on_every_screen(
     browser: Browser, name: str, width: int, height: int, theme: Literal["light", "dark"]
 ) -> None:
     run = run_of(sl.load_robot(name))

@@ -1,4 +1,4 @@
-"""A real mouse that pulls at the platform, cuts a cable and shakes a mode, in headless Chromium."""
+"""A real mouse pushes the platform, cuts a cable and animates a mode in headless Chromium."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def uncovered(page: Page, x: float, y: float) -> None:
         ),
     ],
 )
-def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[int, int]) -> None:
+def test_a_mouse_pushes_cuts_and_shakes(browser: Browser, name: str, size: tuple[int, int]) -> None:
     told: list[ViewerCameraMessage] = []
     with opened(browser, sl.load_robot(name), width=size[0], height=size[1], cameras=told) as (page, viewer):
         settle(page, viewer, told)

@@ -1,4 +1,4 @@
-"""A calibration in the page: ellipsoids as large as the errors, poses in the color of their fit, rows to be chosen."""
+"""A calibration in the page: ellipsoids with the size of errors, poses in the color of their fit, selectable rows."""
 
 import re
 from collections.abc import Iterator
@@ -94,7 +94,7 @@ def test_one_pose_in_twenty_has_another_color() -> None:
     assert shares[2] == pytest.approx(0.001, abs=7e-4)
 
 
-def test_a_pose_tells_its_residuals() -> None:
+def test_a_pose_shows_its_residuals() -> None:
     text = unescape(re.sub(r"<[^>]+>", " ", feature.pose_residuals(calibrated(), 17))).replace("\u00a0", " ")
     assert text.split(":")[0].split() == ["Row", "17"]
     cells = re.findall(r"(−?[\d.]+) (µm|mm|N) +(−?[\d.]+) σ", text)
@@ -109,7 +109,7 @@ def test_a_pose_tells_its_residuals() -> None:
     assert "position" in feature.pose_residuals(calibrated(), 16)
 
 
-def test_kinds_are_told_with_their_units() -> None:
+def test_kinds_are_shown_with_their_units() -> None:
     text = unescape(re.sub(r"<[^>]+>", " ", feature.parameters_text(calibrated()))).replace("\u00a0", " ")
     moved = 1e3 * np.sqrt(np.mean((calibrated().values[:24] - calibrated().parameters.prior[:24]) ** 2))
     error = 1e3 * np.sqrt(np.mean(calibrated().standard_error[:24] ** 2))
@@ -124,7 +124,7 @@ def test_kinds_are_told_with_their_units() -> None:
     assert "frame anchors z, 60 %" in feature.parameters_text(hardly)
 
 
-def test_meters_and_radians_of_one_kind_are_told_apart() -> None:
+def test_meters_and_radians_of_one_kind_are_distinguished() -> None:
     robot = calibrated().before
     numbers = parameters(robot, ("measuring_frame",))
     found = replace(
@@ -136,7 +136,7 @@ def test_meters_and_radians_of_one_kind_are_told_apart() -> None:
 
 
 @pytest.mark.parametrize("status", list(sl.CalibrationStatus))
-def test_the_verdict_is_that_of_the_calibration(status: sl.CalibrationStatus) -> None:
+def test_the_verdict_agrees_with_the_calibration(status: sl.CalibrationStatus) -> None:
     text = feature.verdict_text(replace(calibrated(), status=status))
     assert (" good" in text) == (status is sl.CalibrationStatus.FOUND)
     for reason, rows in calibrated().left_out.items():
@@ -145,7 +145,7 @@ def test_the_verdict_is_that_of_the_calibration(status: sl.CalibrationStatus) ->
 
 
 @extended
-def test_errors_are_drawn_as_large_as_is_told(page: Shown, client: Client) -> None:
+def test_errors_are_drawn_with_the_stated_size(page: Shown, client: Client) -> None:
     def semi_axes(where: str) -> np.ndarray:
         return np.sort(page.node(f"{where}/errors").batched_scales.max(axis=1))
 
@@ -180,14 +180,14 @@ def test_errors_are_drawn_as_large_as_is_told(page: Shown, client: Client) -> No
 
 @extended
 @pytest.mark.parametrize("factor", [0.0, -3.0, float("nan"), 1e300])
-def test_factors_that_are_none_are_refused(page: Shown, client: Client, factor: float) -> None:
+def test_invalid_factors_are_refused(page: Shown, client: Client, factor: float) -> None:
     client.set(handle(page, "Drawn ×"), factor)
     await_that(lambda: "Type a factor" in page.text)
     choose(page, client, "Drawn ×", 10.0)
     assert "enlarged 10 times" in page.text
 
 
-def test_a_row_that_is_chosen_is_gone_to(page: Shown, client: Client) -> None:
+def test_a_chosen_row_moves_the_platform(page: Shown, client: Client) -> None:
     choose(page, client, FIELD, "17")
     await_that(lambda: np.allclose(page.position, calibrated().poses.position[17]))
     assert "Row 17" in page.text
@@ -200,7 +200,7 @@ def test_a_row_that_is_chosen_is_gone_to(page: Shown, client: Client) -> None:
 
 
 @extended
-def test_a_pose_that_is_clicked_is_chosen(page: Shown, client: Client) -> None:
+def test_a_clicked_pose_is_chosen(page: Shown, client: Client) -> None:
     np.testing.assert_allclose(page.node("/log").batched_positions, calibrated().poses.position, rtol=1e-6)
     np.testing.assert_array_equal(page.node("/log").batched_colors, feature.COLORS[feature.bands(calibrated())])
     assert [page.node(f"/log/{row}").text for row in (4, 17)] == ["row 4, cable 3", "row 17, cable 6"]
@@ -216,7 +216,7 @@ def test_a_pose_that_is_clicked_is_chosen(page: Shown, client: Client) -> None:
     assert page.node("/log") is not None
 
 
-def test_of_a_long_log_some_poses_are_drawn_and_those_that_do_not_fit() -> None:
+def test_a_selection_of_a_long_log_and_all_outliers_are_drawn() -> None:
     count = 10_000
     long = replace(
         calibrated(),
@@ -234,7 +234,7 @@ def test_of_a_long_log_some_poses_are_drawn_and_those_that_do_not_fit() -> None:
         assert names == ["row 1234, cable 3"]
 
 
-def test_a_mass_that_was_found_fits_its_field_and_stays_what_it_is(page: Shown) -> None:
+def test_an_estimated_mass_is_shown_exactly(page: Shown) -> None:
     assert written_mass(91.366634512) == 91.367
     field = handle(page, "Platform + load [kg]")
     assert field.value == written_mass(calibrated().robot.mass) != calibrated().robot.mass

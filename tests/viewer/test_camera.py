@@ -1,4 +1,4 @@
-"""What a client sees where, against a camera that is worked out by hand."""
+"""Projections of a camera compared with calculations by hand."""
 
 from types import SimpleNamespace
 
@@ -24,14 +24,14 @@ def eye() -> Camera:
     return found
 
 
-def test_a_point_is_seen_where_similar_triangles_put_it() -> None:
+def test_projections_agree_with_similar_triangles() -> None:
     places, deep = eye().project(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 1.0], [1.0, 10.0, 0.0], [0.0, -20.0, 0.0]]))
     # half of the picture's height, 300 px, is 5 m at a distance of 10 m
     np.testing.assert_allclose(places[:3], [[400.0, 300.0], [520.0, 240.0], [430.0, 300.0]], atol=1e-9)
     np.testing.assert_allclose(deep, [10.0, 10.0, 20.0, -10.0], atol=1e-12)
 
 
-def test_a_ray_leads_back_to_what_is_seen() -> None:
+def test_a_ray_leads_back_to_the_point() -> None:
     some = np.random.default_rng(2).uniform(-3.0, 3.0, size=(20, 3))
     places, deep = eye().project(some)
     for point, place, depth in zip(some, places / [800.0, 600.0], deep, strict=True):
@@ -50,12 +50,12 @@ def test_a_ray_leads_back_to_what_is_seen() -> None:
         {"wxyz": np.zeros(4)},
     ],
 )
-def test_nonsense_is_no_camera(wrong: dict[str, object]) -> None:
+def test_invalid_cameras_are_refused(wrong: dict[str, object]) -> None:
     assert Camera.of(SimpleNamespace(**(vars(CAMERA) | wrong))) is None
 
 
 @pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
-def test_a_ray_meets_the_platform_where_each_triangle_by_itself_is(name: str) -> None:
+def test_the_intersection_of_ray_and_platform_agrees_with_single_triangles(name: str) -> None:
     body = shapes.platform_solid(sl.load_robot(name))
     size = float(np.abs(body.vertices).max())
     random = np.random.default_rng(4)
@@ -80,7 +80,7 @@ def test_a_ray_meets_the_platform_where_each_triangle_by_itself_is(name: str) ->
     assert hits > 5
 
 
-def test_the_nearest_line_is_chosen_and_of_two_that_cross_the_one_in_front() -> None:
+def test_the_nearest_line_is_chosen_and_at_a_crossing_the_front_one() -> None:
     across = np.array([[-3.0, 0.0, 1.0], [3.0, 0.0, 1.0]])
     upright = np.array([[1.0, 2.0, -3.0], [1.0, 2.0, 3.0]])  # behind it
     lines = np.stack((across, upright))

@@ -1,4 +1,4 @@
-"""What pages and server say to each other beside viser's own words."""
+"""Messages between pages and server in addition to those of viser."""
 
 import json
 import re
@@ -37,7 +37,7 @@ def say(server: PageServer, client: Client, text: Any) -> None:
     client.set(handle(server, NAME), text)
 
 
-def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: PageServer, channel: Channel) -> None:
+def test_messages_are_processed_in_order_and_invalid_ones_ignored(server: PageServer, channel: Channel) -> None:
     heard: list[Any] = []
     channel.on("test", lambda value, client: heard.append((value, client)))
     with Client(server.url) as client:
@@ -50,7 +50,7 @@ def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: PageServ
         assert len({number for _, number in heard}) == 1
 
 
-def test_who_comes_later_is_told_the_last_word(server: PageServer, channel: Channel) -> None:
+def test_later_clients_receive_the_last_message(server: PageServer, channel: Channel) -> None:
     channel.send("news", {"a": 1})
     channel.send("news", {"a": 2})
     with Client(server.url) as client:
@@ -70,7 +70,7 @@ def test_a_value_is_text_in_an_attribute() -> None:
     assert '"' not in chosen_by("x", 'a"b').split('data-value="')[1][:-1]
 
 
-def test_an_answer_reaches_who_asked_and_nobody_else(server: PageServer, channel: Channel) -> None:
+def test_an_answer_reaches_only_the_asking_client(server: PageServer, channel: Channel) -> None:
     channel.on("ask", lambda value, client: channel.send_to(client, "asked", value))
     with Client(server.url) as one, Client(server.url) as other:
         for k in range(20):  # in turn, faster than pages are drawn

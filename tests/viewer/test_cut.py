@@ -1,4 +1,4 @@
-"""A cable that is clicked, cut, and calmed again, by a client without a browser."""
+"""A cable is clicked, cut and restored by a client without a browser."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def button_of(page: Shown, cable: int) -> Any:
     return next(found, None)
 
 
-def test_a_click_marks_the_cable_below_it_and_one_beside_none(page: Shown) -> None:
+def test_a_click_marks_the_cable_below_it(page: Shown) -> None:
     with Client(page.url) as client:
         camera, chosen = look(client, page), handle(page, "Cable to cut")
         for cable in (0, 3, 5):
@@ -71,7 +71,7 @@ def test_a_click_marks_the_cable_below_it_and_one_beside_none(page: Shown) -> No
 
 
 @extended
-def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
+def test_the_motion_agrees_with_simulate_and_undo_restores_all(page: Shown) -> None:
     def played() -> Played | None:
         assert page.viewer.view is not None
         return page.viewer.view.played
@@ -107,7 +107,7 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         assert not handle(page, "Undo cut").visible
 
 
-def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
+def test_a_run_loaded_in_the_meantime_is_kept() -> None:
     server = start_server(port=0)
     try:
         given, first, second = PlayedSimulation(made.simulation()), made.simulation(50), made.simulation(60)
@@ -125,7 +125,7 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
         stop_server(server)
 
 
-def test_cut_by_cut_all_is_put_back() -> None:
+def test_undo_restores_cut_by_cut() -> None:
     server = start_server(port=0)
     try:
         given = PlayedSimulation(made.simulation())
@@ -146,7 +146,7 @@ def test_cut_by_cut_all_is_put_back() -> None:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "fast"]))
-def test_the_first_part_is_soon_there_and_begins_what_follows(name: str) -> None:
+def test_the_first_part_is_shown_early(name: str) -> None:
     robot = sl.load_robot(name)
     state = sl.inverse(robot, home_pose(robot), tension=sl.MinimumNorm()).state
     parts = cut.simulate_cut(state, 1, "none")
@@ -162,7 +162,7 @@ def test_the_first_part_is_soon_there_and_begins_what_follows(name: str) -> None
     assert np.abs(second.energy.error).max() < 1e-3 * kinetic.max()
 
 
-def test_a_clock_at_the_end_of_what_is_known_waits_and_goes_on() -> None:
+def test_the_clock_waits_at_the_end_of_simulated_time() -> None:
     player = Player(None, lambda played: None)
     whole = made.simulation()
     player.play(PlayedSimulation(whole), at_once=True)
@@ -176,7 +176,7 @@ def test_a_clock_at_the_end_of_what_is_known_waits_and_goes_on() -> None:
     assert (player.time, player.playing) == (1.0, False)
 
 
-def test_what_was_played_is_put_back_where_its_clock_stood() -> None:
+def test_the_previous_run_is_restored_at_its_time() -> None:
     run = PlayedSimulation(made.simulation())
     player = Player(run, lambda played: None)
     player.scrub_to(0.7)

@@ -1,4 +1,4 @@
-"""The dot in the field of feasible tensions: where it can go, what it chooses, and what a page may say of it."""
+"""The dot in the polygon of feasible tensions: its range, its tensions, and valid messages of a page."""
 
 import json
 import re
@@ -74,7 +74,7 @@ def nearest_by_program(polygon: sl.TensionPolygon, low: Any, high: Any, at: np.n
 
 
 @pytest.mark.parametrize("name", ["cogiro", "falcon-7", "ipanema-1"])
-def test_dot_stays_at_the_nearest_point_of_the_field(name: str) -> None:
+def test_the_dot_stays_at_the_nearest_feasible_point(name: str) -> None:
     robot, generator = sl.load_robot(name), np.random.default_rng(3)
     field = dot_field_of(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
     assert field is not None
@@ -89,7 +89,7 @@ def test_dot_stays_at_the_nearest_point_of_the_field(name: str) -> None:
         assert np.all(inside <= robot.tension_max * (1.0 + 1e-9))
 
 
-def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
+def test_an_unbounded_polygon_is_drawn_up_to_the_known_points() -> None:
     robot = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
     snapshot = snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None)
     field = dot_field_of(snapshot)
@@ -109,7 +109,7 @@ def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
 
 
 @extended
-def test_chosen_tensions_balance_with_heavy_cables_and_keep_their_limits(page: Shown) -> None:
+def test_chosen_tensions_are_feasible_with_heavy_cables(page: Shown) -> None:
     generator = np.random.default_rng(4)
     with Client(page.url) as client:
         field = dot_field_of(seen(page))
@@ -137,7 +137,7 @@ def test_chosen_tensions_balance_with_heavy_cables_and_keep_their_limits(page: S
         assert BY_HAND in snapshot.origin
 
 
-def test_code_of_what_is_chosen_by_hand_gives_its_tensions(page: Shown) -> None:
+def test_copied_code_gives_the_chosen_tensions(page: Shown) -> None:
     with Client(page.url) as client:
         snapshot = moved(page, client, {"at": [120.0, -60.0]})
         view = page.viewer.view
@@ -148,7 +148,7 @@ def test_code_of_what_is_chosen_by_hand_gives_its_tensions(page: Shown) -> None:
         np.testing.assert_array_equal(made["tension"], snapshot.tension)
 
 
-def test_steps_add_up_and_stop_at_the_sides() -> None:
+def test_steps_add_up_and_stop_at_the_limits() -> None:
     with contextmanager(shown)(lambda server: Page(server, FEATURES, HEAVY)) as page, Client(page.url) as client:
         field = dot_field_of(seen(page))  # as large as the first at a pose are the steps there
         assert field is not None
@@ -165,7 +165,7 @@ def test_steps_add_up_and_stop_at_the_sides() -> None:
         assert np.linalg.norm(back.tension - snapshot.tension) > 0.015 * size  # it does not stick to the side
 
 
-def test_a_drag_keeps_the_tensions_nearest_to_those_chosen(page: Shown) -> None:
+def test_a_drag_keeps_the_nearest_tensions_to_the_chosen_ones(page: Shown) -> None:
     with Client(page.url) as client:
         chosen = moved(page, client, {"at": [150.0, 80.0]}).tension
         client.grab()
@@ -184,7 +184,7 @@ def test_a_drag_keeps_the_tensions_nearest_to_those_chosen(page: Shown) -> None:
         await_that(lambda: np.allclose(seen(page).tension, chosen, rtol=0.0, atol=1e-6))  # and back again
 
 
-def test_a_mark_chooses_its_way_and_the_list_says_so(page: Shown) -> None:
+def test_a_mark_chooses_its_method_and_the_list_shows_it(page: Shown) -> None:
     with Client(page.url) as client:
         moved(page, client, {"at": [10.0, 10.0]})
         method = handle(page, "Tensions")
@@ -207,7 +207,7 @@ def test_a_mark_chooses_its_way_and_the_list_says_so(page: Shown) -> None:
     wide([{"at": [1e300, 0.0]}, None, 3, "x", [], {}, {"at": None}, {"at": [1.0]}, {"at": ["a", "b"]},
      {"by": [True, 1]}, {"at": [[1.0], 2.0]}, {"by": [float("nan"), 0.0]}, {"at": {"0": 1.0}}]),
 )  # fmt: skip
-def test_what_is_no_place_is_not_heard(page: Shown, value: Any) -> None:
+def test_invalid_places_are_ignored(page: Shown, value: Any) -> None:
     with Client(page.url) as client:
         before = moved(page, client, {"at": [5.0, 5.0]}).tension
         say(page, client, value)
@@ -218,7 +218,7 @@ def test_what_is_no_place_is_not_heard(page: Shown, value: Any) -> None:
     assert page.thread.is_alive()
 
 
-def test_marks_are_where_their_ways_are() -> None:
+def test_marks_are_at_the_results_of_their_methods() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
@@ -250,9 +250,7 @@ def changed(name: str) -> sl.Robot:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "guides", "ipanema-2-pulleys", "article-suspended"], 2))
-def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_marks_of_a_moved_robot_agree_with_a_new_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the second pose on solvers answer, which know no guides; another robot has none at first."""
     robot, moved, calls = changed(name), MethodMarks(), list[sl.Pose]()
 
@@ -277,7 +275,7 @@ def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
     assert len(calls) == len(METHODS)
 
 
-def test_what_a_way_misses_is_told() -> None:
+def test_methods_without_a_result_are_listed() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([5.0, 3.0, 2.2], np.eye(3))
     snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
@@ -290,7 +288,7 @@ def test_what_a_way_misses_is_told() -> None:
     assert re.search(r"ClosedForm: none", html)
 
 
-def test_a_field_keeps_its_place_while_the_dot_moves() -> None:
+def test_the_polygon_does_not_move_with_the_dot() -> None:
     settings = Settings(mass=HEAVY.mass)
     first = dot_field_of(snapshot_at(HEAVY, home_pose(HEAVY), settings, None))
     assert isinstance(first, DotField)

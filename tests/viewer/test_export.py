@@ -1,4 +1,4 @@
-"""What one takes away."""
+"""Exported scenes."""
 
 from io import BytesIO
 from typing import Any
@@ -31,7 +31,7 @@ def corners_of(scene: Any, name: str) -> np.ndarray:
     return np.asarray(scene.geometry[geometry].vertices @ place[:3, :3].T + place[:3, 3])
 
 
-def test_glb_holds_the_scene_in_meters_with_y_up() -> None:
+def test_glb_contains_the_scene_in_meters_with_y_up() -> None:
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     scene = exported(ROBOT, pose)
     assert set(scene.geometry) == {"frame", "winches", "platform", *(f"cable {i}" for i in range(8))}
@@ -44,7 +44,7 @@ def test_glb_holds_the_scene_in_meters_with_y_up() -> None:
         assert away.min() < 0.05
 
 
-def test_glb_holds_pulleys_as_they_have_turned_and_what_is_behind() -> None:
+def test_glb_contains_rotated_pulleys_and_the_routing() -> None:
     winch = sl.Winch(pulley_radius=[0.0] + [0.3] * 7, dead_cable=2.0, dead_rise=[2.0] * 4 + [1.0] * 4, drum_radius=0.2)
     robot, pose = ROBOT.replace(winches=winch), sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     scene = exported(robot, pose)

@@ -1,4 +1,4 @@
-"""Work beside the page: it gives way to what draws."""
+"""Background work gives priority to drawing."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ from sagline.viewer.feature import NICENESS, BackgroundTask
 from tests.viewer.client import PATIENCE
 
 
-def test_it_gives_way_to_what_draws_which_stays_as_it_is() -> None:
+def test_background_work_gives_priority_to_drawing() -> None:
     before, soon, found = os.nice(0), Queue[Callable[[], None]](), list[int]()
     BackgroundTask(soon.put).start(lambda: os.nice(0), found.append, pytest.fail)
     soon.get(timeout=PATIENCE)()

@@ -1,4 +1,4 @@
-"""Films and pictures as clients are told of them, over a bare websocket."""
+"""Messages of films and pictures, over a plain websocket."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -47,7 +47,7 @@ def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
 
 
 @extended
-def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
+def test_a_film_does_not_affect_other_clients(film: Shown) -> None:
     """One client films, gives its pictures slowly, and leaves in the middle; another drags meanwhile."""
     button = handle(film, "Film of the run")
     with Client(film.url) as filming, Client(film.url) as other:
@@ -76,7 +76,7 @@ def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
     await_that(lambda: not taking(film))
 
 
-def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> None:
+def test_a_film_is_sent_frame_by_frame_and_can_be_cancelled(film: Shown) -> None:
     button, length = handle(film, "Film of the run"), PATH.time[-1]
     with Client(film.url) as client:
         client.replayed()
@@ -111,7 +111,7 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
         assert not client.met(film.server).scene._handle_from_node_name
 
 
-def test_a_film_longer_than_a_browser_can_keep_is_refused() -> None:
+def test_a_film_that_is_too_long_is_refused() -> None:
     with refused("film", allowed="at most 120 s", kind=sl.InvalidValueError) as caught:
         moments(120.0, 0.25)
     assert caught.value.value.startswith("480 s")
@@ -120,7 +120,7 @@ def test_a_film_longer_than_a_browser_can_keep_is_refused() -> None:
     assert len(moments(0.0, 1.0)) == 2
 
 
-def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
+def test_a_picture_is_requested_in_the_size_of_paper(film: Shown) -> None:
     paper, strip, button = handle(film, "Picture for"), handle(film, "With legend"), handle(film, "Picture (PNG)")
     with Client(film.url) as client:
         client.replayed()
@@ -152,7 +152,7 @@ def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
     "camera",
     [{"wxyz": [0, 0, 0, 0]}, {"fov": 0.0}, {"fov": -1.0}, {"image_height": 0}, {"position": [0, float("nan"), 0]}],
 )
-def test_a_client_with_a_camera_that_cannot_be_gets_no_picture(film: Shown, camera: dict[str, Any]) -> None:
+def test_an_invalid_camera_gets_no_picture(film: Shown, camera: dict[str, Any]) -> None:
     with Client(film.url) as client:
         framed(client, film)
         eye: dict[str, Any] = {"wxyz": [1, 0, 0, 0], "up_direction": [0, 0, 1], "position": [0, -20, 3], "fov": 1.0}
@@ -167,7 +167,7 @@ def test_a_client_with_a_camera_that_cannot_be_gets_no_picture(film: Shown, came
     await_that(lambda: not taking(film))
 
 
-def test_a_picture_shows_what_the_window_shows_of_a_box(film: Shown) -> None:
+def test_a_picture_shows_the_view_of_the_window(film: Shown) -> None:
     """A camera 10 m before a box 2 m deep: nearest face at 9 m, slopes 3/9 and 1/9 of its half width and height."""
 
     class Camera:

@@ -1,4 +1,4 @@
-"""The forces on the platform: those of cables as they hang, that close; what is drawn and told of them."""
+"""Forces on the platform: forces of catenaries close the polygon; drawings and texts."""
 
 import re
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ def held(robot: sl.Robot, away: tuple[float, float, float] = (0.4, 0.3, -0.3)) -
 
 
 @pytest.mark.parametrize("robot", [HEAVY, sl.load_robot("cogiro"), sl.load_robot("ipanema-2-pulleys")])
-def test_forces_are_those_of_the_ends_of_the_cables_as_they_hang(robot: sl.Robot) -> None:
+def test_forces_are_tangent_to_the_catenaries(robot: sl.Robot) -> None:
     state = held(robot)
     expected = pulled(state)
     np.testing.assert_allclose(forces_of_cables(state), expected, rtol=0.0, atol=1e-7 * np.abs(expected).max())
@@ -43,7 +43,7 @@ def test_forces_are_those_of_the_ends_of_the_cables_as_they_hang(robot: sl.Robot
         assert np.abs(state.chord_tension[:, None] * chords - expected).max() > 10.0
 
 
-def test_they_close_with_weight_and_load() -> None:
+def test_forces_close_with_weight_and_load() -> None:
     state = held(HEAVY)
     pulls = forces_on_platform(state)
     assert [each.name for each in pulls][-2:] == ["weight", "load"]
@@ -70,7 +70,7 @@ def arrows(html: str) -> list[np.ndarray]:
     return views
 
 
-def test_arrows_are_drawn_head_to_tail_as_long_as_the_forces() -> None:
+def test_arrows_are_head_to_tail_with_the_lengths_of_forces() -> None:
     state = held(HEAVY)
     pulls = forces_on_platform(state)
     html = force_polygon_figure(state)
@@ -97,7 +97,7 @@ def names_in(html: str) -> Iterator[list[np.ndarray]]:
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
-def test_names_of_arrows_stand_beside_each_other(name: str) -> None:
+def test_names_of_arrows_do_not_overlap(name: str) -> None:
     robot = sl.load_robot(name)
     plan = sl.inverse(robot, home_pose(robot))
     for boxes in names_in(force_polygon_figure(plan.state)):
@@ -109,7 +109,7 @@ def test_names_of_arrows_stand_beside_each_other(name: str) -> None:
                 assert (np.minimum(high, other[1]) - np.maximum(low, other[0])).min() <= 0.0
 
 
-def test_numbers_are_those_of_the_cables() -> None:
+def test_numbers_agree_with_the_cables() -> None:
     state = held(HEAVY)
     rows = dict(re.findall(ROW, force_polygon_figure(state)))
     expected, arm = pulled(state), state.pose.rotation.apply(HEAVY.platform_anchors - HEAVY.center_of_mass)
@@ -160,7 +160,7 @@ def test_a_platform_that_cannot_turn_has_no_moments() -> None:
     assert len(arrows(force_polygon_figure(flat))) == 1
 
 
-def test_forces_that_are_all_level_are_drawn_from_above() -> None:
+def test_level_forces_are_drawn_from_above() -> None:
     anchors = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]])
     level = sl.Robot(
         name="level", frame_anchors=anchors, platform_anchors=(anchors - [2.0, 2.0, 0.0]) * [-0.1, 0.1, 0.0], mass=10.0,
@@ -184,7 +184,7 @@ def page() -> Iterator[Shown]:
     yield from shown(lambda server: Page(server, FEATURES, sl.load_robot("falcon-7")))
 
 
-def test_arrows_in_the_scene_come_and_go(page: Shown) -> None:
+def test_arrows_in_the_scene_are_shown_and_hidden(page: Shown) -> None:
     wanted = handle(page, "Forces in the scene")
     with Client(page.url) as client:
         client.replayed()

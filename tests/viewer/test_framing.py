@@ -1,4 +1,4 @@
-"""Where the camera stands."""
+"""Positions of the camera."""
 
 import time
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: flo
 
 @pytest.mark.parametrize("aspect", [0.4, 0.7, 1.0, 1.6, 3.0])
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
-def test_every_robot_fills_the_picture_and_no_more(name: str, aspect: float) -> None:
+def test_every_robot_fills_the_picture(name: str, aspect: float) -> None:
     low, high = shapes.bounds(sl.load_robot(name))
     camera, target = fitted(low, high, aspect)
     middle = 0.5 * (low + high)
@@ -46,7 +46,7 @@ def at(camera: Any, position: Any) -> bool:
 
 
 @extended
-def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> None:
+def test_the_robot_stays_in_the_picture_until_the_camera_is_moved() -> None:
     low, high = np.array([-5.0, -4.0, 0.0]), np.array([5.0, 4.0, 6.0])
     server = start_server(port=0)
     try:
@@ -76,7 +76,7 @@ def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> No
         stop_server(server)
 
 
-def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() -> None:
+def test_a_camera_set_by_a_link_is_kept() -> None:
     low, high = np.zeros(3), np.ones(3)
     server = start_server(port=0)
     try:
@@ -103,7 +103,7 @@ def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() 
 
 
 @extended
-def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() -> None:
+def test_an_automatic_camera_motion_is_not_a_manual_one() -> None:
     server = start_server(port=0)
     try:
         framing = Framing(server, np.zeros(3), np.ones(3))
@@ -127,7 +127,7 @@ def page() -> Iterator[Shown]:
     yield from shown(lambda server: Page(server, (), ROBOT, pose=POSE))
 
 
-def test_a_camera_follows_a_jump_of_the_platform_out_of_the_picture_but_no_drag(page: Shown) -> None:
+def test_a_camera_follows_a_jump_of_the_platform_and_no_drag(page: Shown) -> None:
     with Client(page.url) as client:
         camera = look(client, page)
         for x, expected in ((1.0, 0.5), (9.0, 8.5), (0.5, 0.0)):  # near, out of sight, and back

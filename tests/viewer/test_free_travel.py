@@ -1,4 +1,4 @@
-"""How far a platform can go, in a workspace that is known."""
+"""Free travel of a platform in a known workspace."""
 
 import re
 
@@ -14,7 +14,7 @@ ALL = np.arange(6)
 NEWTON = ForceUnit("N", 1.0, ".1f")
 
 
-def test_ways_end_at_the_boundary_or_at_the_box() -> None:
+def test_travel_ends_at_the_boundary_or_at_the_box() -> None:
     start = np.array([0.2, -0.3, 0.4])
     found = free_travel(ball, start, ALL, LOW, np.array([2.0, 0.5, 2.0]))
     half = np.sqrt(RADIUS**2 - start @ start + start**2)  # of the chord along each axis
@@ -27,7 +27,7 @@ def test_ways_end_at_the_boundary_or_at_the_box() -> None:
     np.testing.assert_allclose(np.linalg.norm(found.ends[[2, 3, 4, 5]], axis=1), RADIUS, atol=2e-5)
 
 
-def test_the_nearest_end_is_told_first() -> None:
+def test_the_nearest_end_is_printed_first() -> None:
     found = free_travel(ball, np.array([0.2, -0.3, 0.4]), ALL, LOW, HIGH)
     html = travel_text(found, NEWTON)
     nearest = NAMES[int(found.distance.argmin())]
@@ -36,7 +36,7 @@ def test_the_nearest_end_is_told_first() -> None:
     assert html.count("the boundary") == 6
 
 
-def test_from_outside_ways_lead_back() -> None:
+def test_travel_from_outside_leads_back() -> None:
     found = free_travel(ball, np.array([-1.9, 0.0, -0.1]), ALL, LOW, HIGH)
     assert not found.inside
     assert found.crossed.tolist() == [True, False, False, False, False, False]
@@ -46,12 +46,12 @@ def test_from_outside_ways_lead_back() -> None:
     assert "workspace, cable 5" in html
 
 
-def test_ways_of_a_platform_that_moves_in_a_plane_are_four() -> None:
+def test_a_planar_platform_has_four_directions() -> None:
     found = free_travel(ball, np.zeros(3), np.array([0, 2, 3, 5]), LOW, HIGH)
     np.testing.assert_allclose(found.distance, [WALL, RADIUS, RADIUS, RADIUS], atol=2e-5)
 
 
-def test_a_platform_beyond_the_box_finds_back_if_an_axis_leads_there() -> None:
+def test_a_platform_outside_of_the_box_finds_back_along_an_axis() -> None:
     found = free_travel(ball, np.array([0.0, 0.0, 5.0]), ALL, LOW, HIGH)
     assert found.crossed.tolist() == [False] * 5 + [True]
     assert found.distance[5] == pytest.approx(5.0 - RADIUS, abs=1e-3)

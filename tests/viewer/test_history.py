@@ -1,4 +1,4 @@
-"""Undo, redo and reset of everything that is changed on a page."""
+"""Undo, redo and reset of all changes of a page."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def at(page: Shown, position: list[float], density: float = 1.0) -> bool:
     return np.array_equal(page.position, position) and view(page).settings.density == density
 
 
-def test_poses_and_settings_go_back_and_forth(page: Shown) -> None:
+def test_undo_and_redo_of_poses_and_settings(page: Shown) -> None:
     with Client(page.url) as client:
         client.drag([0.5, 0.25, 2.0])
         recorded(page, lambda: at(page, [0.5, 0.25, 2.0]))
@@ -108,7 +108,7 @@ def test_a_cut_is_undone_and_played_again(page: Shown) -> None:
         assert player.played is not None
 
 
-def test_tensions_by_hand_return(page: Shown) -> None:
+def test_undo_restores_tensions_chosen_by_hand(page: Shown) -> None:
     with Client(page.url) as client:
         before = view(page).snapshot.tension
         tell(page, client, "dot", {"by": [0.1, 0.1]})

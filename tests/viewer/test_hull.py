@@ -1,4 +1,4 @@
-"""The hull of a region: that of the workspace, there in half a second, and closer where there is little of it."""
+"""The hull of a region: that of the workspace, within half a second, on a finer grid if it is small."""
 
 import re
 
@@ -18,7 +18,7 @@ LOADS = sl.WrenchBox(force=50.0)
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 
 
-def test_a_hull_is_that_of_the_workspace() -> None:
+def test_a_hull_agrees_with_the_workspace() -> None:
     shares: list[float] = []
     turned = sl.Pose.from_euler(np.zeros(3), 0.1, 0.0, 0.0)
     asked = WorkspaceQuery(ROBOT, turned.quaternion, sl.Catenary(), LOADS)
@@ -42,7 +42,7 @@ def test_a_hull_is_that_of_the_workspace() -> None:
     assert sum(len(patch.faces) for patch in found.by_margin(MarginScale(10.0))) == len(space.surface.faces)
 
 
-def test_a_hull_that_is_empty_says_what_is_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_empty_hull_names_the_nearest_pose(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workspace, "CELLS", 6)
     asked = WorkspaceQuery(ROBOT, LEVEL, sl.Catenary(), sl.WrenchBox(1e5))
     found = region_hull(asked, False, lambda *_: None)
@@ -53,7 +53,7 @@ def test_a_hull_that_is_empty_says_what_is_nearest(monkeypatch: pytest.MonkeyPat
 
 
 @extended
-def test_a_region_that_is_small_is_looked_at_closer() -> None:
+def test_a_small_region_is_computed_on_a_finer_grid() -> None:
     robot = sl.load_robot("fast")
     asked = WorkspaceQuery(robot, LEVEL, sl.Catenary(), sl.WrenchBox())
     found, region = region_hull(asked, False, lambda *_: None), region_in(asked, rough=False)
@@ -74,7 +74,7 @@ def test_a_region_that_is_small_is_looked_at_closer() -> None:
 @pytest.mark.parametrize(
     "name", ["cogiro", *(pytest.param(one, marks=pytest.mark.soak) for one in ("falcon-7", "fast"))]
 )
-def test_a_region_is_there_in_half_a_second_of_work(name: str) -> None:
+def test_a_region_takes_half_a_second(name: str) -> None:
     robot = sl.load_robot(name)
     asked = WorkspaceQuery(robot.replace(mass=1.1 * robot.mass), LEVEL, sl.Catenary(), sl.WrenchBox())
     assert np.prod(np.array(region_in(asked, rough=False).cells)) > 0.9 * 30**3

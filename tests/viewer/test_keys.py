@@ -1,4 +1,4 @@
-"""Keys that move the platform, as a page sends them, and what is said of it."""
+"""Keys that move the platform, as a page sends them, and the announcements."""
 
 import json
 import re
@@ -41,7 +41,7 @@ def there(page: Shown, position: Any, quaternion: Any) -> bool:
     return np.allclose(pose.position, position, atol=1e-9) and np.allclose(pose.quaternion, quaternion, atol=1e-9)
 
 
-def test_steps_go_along_and_turn_about_the_axes_and_home(page: Shown) -> None:
+def test_keys_translate_rotate_and_move_home(page: Shown) -> None:
     home = home_pose(ROBOT)
     place = home.position + 0.1 * np.array([1.0, -2.0, 0.5])
     tell(page, "nudge", [1, -2, 0.5, 0, 0, 0])
@@ -71,7 +71,7 @@ NONSENSE: tuple[Any, ...] = (
 
 
 @extended
-def test_steps_that_are_none_and_ways_out_of_sight_move_nothing(page: Shown) -> None:
+def test_invalid_steps_and_distant_poses_are_ignored(page: Shown) -> None:
     home = home_pose(ROBOT)
     tell(page, "home", 0)
     await_that(lambda: there(page, home.position, home.quaternion))
@@ -90,7 +90,7 @@ def test_steps_that_are_none_and_ways_out_of_sight_move_nothing(page: Shown) -> 
     assert page.thread.is_alive()
 
 
-def test_turns_are_about_the_axes_of_the_world() -> None:
+def test_rotations_are_about_the_axes_of_the_world() -> None:
     pose = sl.Pose.from_euler([1.0, 2.0, 3.0], 0.4, 0.0, 0.0)
     for axis in range(3):
         turn = TURN * np.eye(3)[axis]

@@ -1,4 +1,4 @@
-"""Labels that do not cover each other, for every client on its own."""
+"""Labels that do not cover each other, for each client separately."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_names_of_axes_and_anchors_give_way() -> None:
     assert covered(there[:2], EYE) == {"/axes/x"}
 
 
-def test_labels_that_are_apart_by_less_than_their_sizes_are_covered() -> None:
+def test_labels_closer_than_their_sizes_overlap() -> None:
     for across, down, hides in ((49.0, 0.0, True), (51.0, 0.0, False), (0.0, 19.0, True), (0.0, 21.0, False)):
         other = label("/b", across / 250.0, down / 250.0, 2.0)  # 250 px a meter at this distance
         assert bool(covered([label("/a", 0.0, 0.0, 2.0), other], EYE)) is hides
@@ -49,7 +49,7 @@ def page() -> Iterator[Shown]:
     yield from shown(lambda server: Page(server, (LabelsFeature,), ROBOT, pose=POSE))
 
 
-def test_every_client_has_labels_of_its_own(page: Shown) -> None:
+def test_every_client_has_its_own_labels(page: Shown) -> None:
     feature = page.viewer.feature(LabelsFeature)
 
     def place_of(name: str) -> np.ndarray:

@@ -71,7 +71,7 @@ WOUND = sl.Winch(
 OVER_PULLEYS = ROBOT.replace(winches=WOUND)
 
 
-def test_cables_run_from_anchor_over_pulley_to_platform() -> None:
+def test_cables_lead_from_the_anchor_over_the_pulley_to_the_platform() -> None:
     """Drawn lengths on the pulleys are arcs of their radius, and the cable bends nowhere else."""
     plan = sl.inverse(OVER_PULLEYS, POSE)
     assert plan.wrap_angle is not None
@@ -93,12 +93,12 @@ def test_cables_run_from_anchor_over_pulley_to_platform() -> None:
     assert bend.max() < 1.01 * plan.wrap_angle.max() / (shapes.WRAP_POINTS - 1)
 
 
-def test_straight_cables_touch_where_the_weightless_leave() -> None:
+def test_straight_cables_leave_pulleys_like_weightless_ones() -> None:
     plan = sl.inverse(OVER_PULLEYS, POSE, model=sl.Elastic())
     np.testing.assert_allclose(shapes.wraps(OVER_PULLEYS, POSE, None)[:, -1], plan.exit_point, atol=1e-12)
 
 
-def test_dead_cable_is_drawn_as_far_as_it_rises() -> None:
+def test_the_dead_length_is_drawn_to_its_rise() -> None:
     runs, upright = shapes.dead_runs(OVER_PULLEYS)
     np.testing.assert_array_equal(runs[:, 0], ROBOT.frame_anchors)
     np.testing.assert_array_equal(runs[:, 1, :2], ROBOT.frame_anchors[:, :2])
@@ -107,7 +107,7 @@ def test_dead_cable_is_drawn_as_far_as_it_rises() -> None:
     assert not np.diff(shapes.dead_runs(ROBOT)[0], axis=1).any()
 
 
-def test_drums_touch_the_feet_of_their_runs_from_outside() -> None:
+def test_drums_touch_the_ends_of_their_dead_lengths() -> None:
     axes, feet = shapes.drum_axes(OVER_PULLEYS), shapes.dead_runs(OVER_PULLEYS)[0][:, 1]
     np.testing.assert_allclose(np.linalg.norm(axes[:, 1] - axes[:, 0], axis=1), 0.5, rtol=1e-12)
     assert not (axes[:, 1] - axes[:, 0])[:, 2].any()

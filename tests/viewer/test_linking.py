@@ -1,4 +1,4 @@
-"""A link brings another page to the same; one of another robot, or nonsense, changes nothing."""
+"""A link gives another page the same state; links of other robots and invalid links change nothing."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def randomly_set(page: Shown, client: Client, random: np.random.Generator) -> No
 
 @extended
 @pytest.mark.parametrize("count", [4, pytest.param(150, marks=pytest.mark.soak)])
-def test_another_page_comes_to_the_same(one: Shown, other: Shown, count: int) -> None:
+def test_another_page_has_the_same_state(one: Shown, other: Shown, count: int) -> None:
     random = np.random.default_rng(20261122)
     with asking(one) as here, asking(other) as there:
         for _ in range(count):
@@ -133,7 +133,7 @@ def test_another_page_comes_to_the_same(one: Shown, other: Shown, count: int) ->
             assert there.link() == link
 
 
-def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
+def test_a_link_contains_all_controls(one: Shown, other: Shown) -> None:
     handles = [each for each in controls(one.server) if hasattr(each, "label")]
     wanted = {id(each) for each in handles if each.label != "sagline" and not each._impl.is_button}
     named = one.viewer.feature(StateFeature).controls._handles()
@@ -160,7 +160,7 @@ def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
 
 
 @extended
-def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> None:
+def test_a_link_contains_all_earlier_settings(one: Shown) -> None:
     mass = handle(one, "Platform + load [kg]")
     usual = mass.value
     with asking(one) as here:
@@ -177,7 +177,7 @@ def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> No
 
 
 @extended
-def test_controls_of_one_name_are_told_apart(one: Shown, other: Shown) -> None:
+def test_controls_with_equal_names_are_distinguished(one: Shown, other: Shown) -> None:
     values = {"Force": "about z", "Force ± [N]": 12.5, "Force [N]": 3.25}
     usual = {label: handle(one, label).value for label in values}
     with asking(one) as here, asking(other) as there:
@@ -192,13 +192,13 @@ def test_controls_of_one_name_are_told_apart(one: Shown, other: Shown) -> None:
         assert "refused" not in there.ask("link", here.link())
 
 
-def test_a_page_as_it_was_opened_tells_its_pose_alone() -> None:
+def test_the_link_of_an_initial_page_contains_only_the_pose() -> None:
     with a_page() as page, asking(page) as here:
         assert here.link() == f"robot={name_of(ROBOT)}&pose=0,0,2.6"
 
 
 @extended
-def test_the_camera_of_who_asks_comes_with_it(one: Shown, other: Shown) -> None:
+def test_a_link_contains_the_camera_of_the_client(one: Shown, other: Shown) -> None:
     with asking(one) as here, asking(other) as there:
         framed(here.client, one)
         assert "camera" not in here.link()
@@ -216,7 +216,7 @@ def test_the_camera_of_who_asks_comes_with_it(one: Shown, other: Shown) -> None:
 
 
 @extended
-def test_payload_wrench_and_tensions_by_hand_come_with_it() -> None:
+def test_a_link_contains_payload_wrench_and_chosen_tensions() -> None:
     loaded = with_mass(ROBOT, ROBOT.mass + 20.0)
     wrench = np.array([10.0, -20.0, 5.0, 1.0, 2.0, -3.0])
     source = Source.of_robot("cogiro", loaded.mass)
@@ -236,7 +236,7 @@ def test_payload_wrench_and_tensions_by_hand_come_with_it() -> None:
 
 
 @extended
-def test_a_moment_of_a_run() -> None:
+def test_a_link_to_a_time_of_a_run() -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
     run = PlayedPlan(sl.inverse(robot, sl.quintic_path(ends, durations=[2.00000000000777], rate=20)))
@@ -278,7 +278,7 @@ NONSENSE = (
 
 
 @extended
-def test_nonsense_is_refused_in_a_line_and_changes_nothing(one: Shown) -> None:
+def test_invalid_links_are_refused_in_a_line(one: Shown) -> None:
     with asking(one) as here:
         here.ask("pose", "0.5,0.5,2")
         await_that(lambda: view(one).snapshot.pose.position[0] == 0.5)
@@ -303,7 +303,7 @@ def test_a_link_has_the_angles_of_its_pose_about_z_y_x() -> None:
     assert values == pytest.approx([1.0, -2.5, 0.125, 10.0, -20.0, 30.0], abs=1e-9)
 
 
-def test_the_number_of_a_robot_is_of_all_but_its_load() -> None:
+def test_the_digest_of_a_robot_excludes_its_load() -> None:
     assert name_of(ROBOT) == name_of(with_mass(ROBOT, 12.0))
     assert name_of(ROBOT) != name_of(ROBOT.replace(tension_min=ROBOT.tension_min + 1.0))
     assert name_of(ROBOT) != name_of(ROBOT.replace(frame_anchors=ROBOT.frame_anchors + 1e-9))

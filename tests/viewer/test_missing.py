@@ -1,4 +1,4 @@
-"""What is missing where the platform cannot be held, by linear programs; and the nearest pose, by trying many."""
+"""Missing forces at infeasible poses compared with linear programs, and the nearest pose compared with many trials."""
 
 import re
 import threading
@@ -68,7 +68,7 @@ def least_force(state: sl.Equilibrium, given: np.ndarray, count: int = 1500) -> 
 
 
 @pytest.mark.parametrize(("name", "place"), wide(CASES, len(FIRST)))
-def test_missing_force_is_the_least_that_a_linear_program_knows(name: str, place: list[float]) -> None:
+def test_the_missing_force_agrees_with_a_linear_program(name: str, place: list[float]) -> None:
     robot = sl.load_robot(name)
     snapshot = at(robot, sl.Pose(place, np.eye(3)))
     missing = missing_of(snapshot)
@@ -88,7 +88,7 @@ def test_missing_force_is_the_least_that_a_linear_program_knows(name: str, place
 
 
 @pytest.mark.parametrize(("name", "place"), wide(CASES, len(FIRST)))
-def test_cables_at_limits_stand_there_and_another_limit_would_help(name: str, place: list[float]) -> None:
+def test_blocking_cables_are_at_limits_that_would_help(name: str, place: list[float]) -> None:
     robot = sl.load_robot(name)
     snapshot = at(robot, sl.Pose(place, np.eye(3)))
     missing = missing_of(snapshot)
@@ -108,7 +108,7 @@ def test_cables_at_limits_stand_there_and_another_limit_would_help(name: str, pl
         assert np.linalg.norm(wider.force) < before
 
 
-def test_where_no_force_alone_would_do_a_moment_is_told() -> None:
+def test_a_moment_is_shown_if_no_force_is_sufficient() -> None:
     robot = sl.load_robot("ipanema-1")
     pose = sl.Pose.from_euler(home_pose(robot).position, 0.0, np.radians(80.0), np.radians(40.0))
     snapshot = at(robot, pose)
@@ -127,7 +127,7 @@ def test_where_no_force_alone_would_do_a_moment_is_told() -> None:
 
 
 @pytest.mark.parametrize(("name", "place"), wide([case for case in CASES if "pulleys" not in case[0]]))
-def test_nothing_nearer_is_held(name: str, place: list[float]) -> None:
+def test_no_nearer_pose_is_feasible(name: str, place: list[float]) -> None:
     robot, generator = sl.load_robot(name), np.random.default_rng(8)
     pose = sl.Pose(place, np.eye(3))
     nearest = nearest_feasible(robot, pose, sl.Catenary(), None)
@@ -143,7 +143,7 @@ def test_nothing_nearer_is_held(name: str, place: list[float]) -> None:
     assert not plan.feasible.any()
 
 
-def test_a_platform_that_is_turned_too_far_is_turned_back() -> None:
+def test_a_platform_with_an_infeasible_rotation_is_leveled() -> None:
     robot = sl.load_robot("ipanema-1")
     pose = sl.Pose.from_euler(home_pose(robot).position, 0.0, np.radians(80.0), np.radians(40.0))
     assert not at(robot, pose).feasible
@@ -154,7 +154,7 @@ def test_a_platform_that_is_turned_too_far_is_turned_back() -> None:
     assert sl.inverse(robot, nearest.pose).feasible
 
 
-def test_a_load_counts() -> None:
+def test_a_load_is_considered() -> None:
     robot = sl.load_robot("cogiro")
     load = locked(np.array([0.0, 0.0, 1e5, 0.0, 0.0, 0.0]))
     pose = sl.Pose([0.0, 0.0, 2.0], np.eye(3))
@@ -179,7 +179,7 @@ def test_a_planar_robot_is_explained_in_its_plane() -> None:
     assert nearest.pose.position[2] < 3.0
 
 
-def test_other_reasons_are_explained_too() -> None:
+def test_other_reasons_are_explained() -> None:
     robot = sl.load_robot("article-suspended")
     far = sl.Pose([5.0, 3.0, 2.2], np.eye(3))
     settings = Settings(mass=50.0, tension=sl.ClosedForm())
@@ -197,7 +197,7 @@ def test_other_reasons_are_explained_too() -> None:
         assert "Unconstrained motion" in explanation(singular, None, None, searching=True)
 
 
-def test_the_text_says_that_a_search_is_running_until_its_result_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_text_states_a_running_search(monkeypatch: pytest.MonkeyPatch) -> None:
     ended = threading.Event()
     monkeypatch.setattr("sagline.viewer.features.missing.nearest_feasible", lambda *_: ended.wait(PATIENCE) and None)
 
@@ -224,7 +224,7 @@ def page() -> Iterator[Shown]:
 
 
 @extended
-def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
+def test_the_platform_moves_to_the_feasible_pose(page: Shown) -> None:
     with Client(page.url) as client:
         client.grab()
         client.drag([6.3, 2.1, 5.4])

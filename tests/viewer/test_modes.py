@@ -1,4 +1,4 @@
-"""Modes that move in the page, work task, and a simulation that is played as a run is."""
+"""Animated modes, background computations, and simulations played like runs."""
 
 import re
 import threading
@@ -61,7 +61,7 @@ def heard_for(client: Client, seconds: float) -> list[Any]:
 
 
 @extended
-def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
+def test_a_mode_is_animated_at_the_update_rate_and_stops(page: Shown) -> None:
     show = page.viewer.feature(ModesFeature)
     await_that(lambda: show.moving and not show.waiting)  # the response is there too
     assert show.swing is not None
@@ -93,7 +93,7 @@ def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
 
 
 @extended
-def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
+def test_the_list_describes_every_frequency(page: Shown) -> None:
     with Client(page.url) as client:
         client.set(handle(page, "Mode"), "massless 1")
         await_that(lambda: "massless</b>" in page.text)
@@ -118,7 +118,7 @@ def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
 
 
 @extended
-def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(page: Shown) -> None:
+def test_a_drag_stops_the_animation_until_new_modes_exist(page: Shown) -> None:
     with Client(page.url) as client:
         client.set(handle(page, "Mode"), "1")
         await_that(lambda: moves(page))
@@ -134,7 +134,7 @@ def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(
 
 
 @extended
-def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cut_cable_is_simulated_and_played_like_a_run(page: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 
     def cut(state: sl.Equilibrium, cable: int, cable_mass: str) -> Iterator[sl.Simulation]:
@@ -159,7 +159,7 @@ def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatc
         await_that(lambda: moves(page))
 
 
-def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
+def test_cables_of_a_simulation_have_their_lengths() -> None:
     played = PlayedSimulation(made.simulation())
     start, end = played.at(0.0), played.at(9.0)
     state = made.state_at()
@@ -175,7 +175,7 @@ def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
     np.testing.assert_array_equal(actual[[0, -1]], played.simulation.pose.position[[0, -1]])
 
 
-def test_of_work_aside_the_latest_alone_counts() -> None:
+def test_only_the_latest_background_result_is_used() -> None:
     tasks: list[Callable[[], None]] = []
     task, done = BackgroundTask(tasks.append), list[int]()
     gate = threading.Event()
@@ -210,7 +210,7 @@ def test_of_work_aside_the_latest_alone_counts() -> None:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "fast"]))
-def test_every_natural_frequency_among_the_readings_is_pressed_to_see_its_mode(name: str) -> None:
+def test_natural_frequencies_in_the_readings_animate_their_modes(name: str) -> None:
     robot = sl.load_robot(name)
     seen = snapshot_at(robot, home_pose(robot), Settings(robot.mass), None)
     assert seen.plan is not None

@@ -1,4 +1,4 @@
-"""The page around viser's client."""
+"""The page around the client of viser."""
 
 import re
 from html import escape
@@ -13,7 +13,7 @@ from sagline.viewer.server import ClientFile, page_html, start_server, stop_serv
 BUILD = Path(viser.__file__).parent / "client" / "build"
 
 
-def test_the_head_is_ours_and_the_client_what_it_is() -> None:
+def test_the_page_has_its_own_head_and_the_client_of_viser() -> None:
     stock = (BUILD / "index.html").read_text()
     ours = page_html(stock, "<b>robot</b> & co")
     assert re.findall("<title>(.*?)</title>", ours) == [escape("<b>robot</b> & co")]
@@ -24,14 +24,14 @@ def test_the_head_is_ours_and_the_client_what_it_is() -> None:
     assert head.partition("<script")[2] in ours
 
 
-def test_only_the_first_page_is_dressed(tmp_path: Path) -> None:
+def test_only_the_first_page_is_changed(tmp_path: Path) -> None:
     (tmp_path / "other.html").write_bytes(b"<title>Viser</title></head>")
     folder = ClientFile(tmp_path, "robot")
     assert (folder / "other.html").read_bytes() == b"<title>Viser</title></head>"
     assert not (folder / "index.html").is_file()
 
 
-def test_the_server_serves_it_and_viser_stays_what_it_was() -> None:
+def test_the_server_serves_the_page_without_changing_viser() -> None:
     stock = infra.WebsockServer
     server = start_server(port=0, title="cogiro <1>")
     try:

@@ -1,4 +1,4 @@
-"""Colors by the tensions of one pose, and the hint at a sag that cannot be seen."""
+"""Colors of tensions at one pose, and the note on invisible sag."""
 
 import re
 from collections.abc import Iterator
@@ -64,7 +64,7 @@ def test_similar_tensions_have_different_colors_by_pose(page: Shown) -> None:
         await_that(lambda: "of this pose" not in page.text)
 
 
-def test_a_sag_that_cannot_be_seen_is_named_until_it_is_drawn_larger(page: Shown) -> None:
+def test_an_invisible_sag_has_a_note(page: Shown) -> None:
     assert page.viewer.view is not None
     plan = page.viewer.view.snapshot.plan  # type: ignore[union-attr]
     assert plan is not None

@@ -13,7 +13,7 @@ ROBOT = sl.load_robot("article-suspended")
 HERE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
 
 
-def test_drawing_has_the_shape_of_the_polygon_and_the_dot_in_its_place() -> None:
+def test_the_drawing_has_the_shape_of_the_polygon_with_the_dot() -> None:
     html = polygon_figure(snapshot_at(ROBOT, HERE, Settings(mass=50.0, tension=sl.Centroid()), None))
     polygon = sl.tension_polygon(ROBOT, HERE)
     found = re.search(r'<polygon points="(.*?)"', html)
@@ -29,7 +29,7 @@ def test_drawing_has_the_shape_of_the_polygon_and_the_dot_in_its_place() -> None
     assert np.array([float(dot[1]), -float(dot[2])]) - drawn[0] == pytest.approx(where, abs=0.5)
 
 
-def test_sides_are_named_outside_of_the_polygon() -> None:
+def test_edges_are_named_outside_of_the_polygon() -> None:
     html = polygon_figure(snapshot_at(ROBOT, HERE, Settings(mass=50.0), None))
     found = re.search(r'<polygon points="(.*?)"', html)
     assert found is not None
@@ -45,7 +45,7 @@ def test_sides_are_named_outside_of_the_polygon() -> None:
         assert turn * np.linalg.det([end - start, away]) < 0.0
 
 
-def test_other_redundancies_are_told_in_words() -> None:
+def test_other_redundancies_have_a_text() -> None:
     seven = sl.load_robot("falcon-7")
     assert seven.test_box is not None
     middle = sl.Pose(0.5 * (seven.test_box.low + seven.test_box.high), np.eye(3))

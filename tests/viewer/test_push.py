@@ -1,4 +1,4 @@
-"""A push and its answer, against balances, differences and linear programs that do not know of it."""
+"""A push and its effects compared with balances, differences and independent linear programs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def end_forces(state: sl.Equilibrium) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_where_it_goes_all_forces_balance_and_the_lengths_are_held(name: str) -> None:
+def test_the_displaced_platform_is_in_balance_with_fixed_lengths(name: str) -> None:
     state = rest(name)
     robot, push = state.one_robot, push_of(state)
     found = push_response(state, push)
@@ -62,7 +62,7 @@ def test_where_it_goes_all_forces_balance_and_the_lengths_are_held(name: str) ->
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_how_it_gives_way_is_what_differences_of_forward_say(name: str) -> None:
+def test_the_compliance_agrees_with_differences_of_forward(name: str) -> None:
     state = rest(name)
     robot, at = state.one_robot, push_of(state).at
     found = push_response(state, push_of(state))
@@ -88,7 +88,7 @@ def test_how_it_gives_way_is_what_differences_of_forward_say(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_reserve_with_held_lengths_ends_where_forward_finds_a_limit(name: str) -> None:
+def test_the_reserve_with_fixed_lengths_agrees_with_forward(name: str) -> None:
     state = rest(name)
     robot, push = state.one_robot, push_of(state)
     held = push_response(state, push).reserve
@@ -110,7 +110,7 @@ def test_the_reserve_with_held_lengths_ends_where_forward_finds_a_limit(name: st
 
 
 @pytest.mark.parametrize("name", NAMES[:3])
-def test_the_reserve_of_shared_tensions_is_that_of_a_linear_program(name: str) -> None:
+def test_the_reserve_with_redistribution_agrees_with_a_linear_program(name: str) -> None:
     state = rest(name, sl.Elastic())  # weightless: then tensions balance a load linearly
     robot, push = state.one_robot, push_of(state)
     shared = push_response(state, push).redistributed
@@ -147,7 +147,7 @@ def test_a_cable_at_its_limit_leaves_no_reserve_against_it() -> None:
     assert away.reserve.cable != at_limit or away.reserve.force > 0.0
 
 
-def test_it_is_drawn_as_many_times_as_it_moves_and_told_so() -> None:
+def test_the_displacement_is_magnified_and_the_factor_stated() -> None:
     state = rest("cogiro")
     found = push_response(state, push_of(state))
     assert found.loaded is not None
@@ -164,12 +164,12 @@ def test_it_is_drawn_as_many_times_as_it_moves_and_told_so() -> None:
     assert f"{found.redistributed.force - found.force:.1f} N more" in told
 
 
-def test_straight_cables_answer_no_force() -> None:
+def test_straight_cables_have_no_displacement() -> None:
     with refused("push: cable model", "straight", "one that stretches", kind=sl.InvalidValueError):
         push_response(rest("cogiro", sl.Straight()), push_of(rest("cogiro")))
 
 
-def test_what_nothing_holds_is_told() -> None:
+def test_an_unconstrained_motion_is_reported() -> None:
     state = rest("cogiro")
     found = replace(push_response(state, push_of(state)), compliance=np.full((3, 3), np.nan), loaded=None)
     told = push.response_text(found, None)

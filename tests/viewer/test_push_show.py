@@ -1,4 +1,4 @@
-"""A hand that pulls at the platform, told by a client without a browser."""
+"""A push with the mouse, sent by a client without a browser."""
 
 import json
 from collections.abc import Iterator
@@ -60,7 +60,7 @@ def pull(client: Client, page: Shown, phase: str, x: float, y: float, *, keep: b
     tell(client, page, "pull", {"phase": phase, "at": [x, y], "keep": keep})
 
 
-def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
+def test_a_push_is_proportional_to_the_distance_and_ends(page: Shown) -> None:
     with Client(page.url) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
@@ -91,7 +91,7 @@ def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
 
 
 @extended
-def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
+def test_a_kept_push_is_released_by_the_button(page: Shown) -> None:
     show = page.viewer.feature(PushFeature)
     with Client(page.url) as client:
         look(client, page)
@@ -114,7 +114,7 @@ def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
         await_that(lambda: push_of(page) is None)
 
 
-def test_what_is_behind_the_eye_is_not_held(page: Shown) -> None:
+def test_points_behind_the_camera_are_not_pushed(page: Shown) -> None:
     show = page.viewer.feature(PushFeature)
     part = POSE.transform(BODY.vertices[BODY.faces[0]].mean(axis=0))
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks along y
@@ -153,7 +153,7 @@ def test_a_force_can_be_typed(page: Shown) -> None:
 
 
 @extended
-def test_a_client_that_goes_lets_go(page: Shown) -> None:
+def test_a_closed_client_ends_its_push(page: Shown) -> None:
     with Client(page.url) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
@@ -181,7 +181,7 @@ def test_a_client_that_goes_lets_go(page: Shown) -> None:
         ]
     ),
 )
-def test_nonsense_holds_nothing(page: Shown, value: Any) -> None:
+def test_invalid_pushes_are_ignored(page: Shown, value: Any) -> None:
     show = page.viewer.feature(PushFeature)
     with Client(page.url) as client:
         look(client, page)

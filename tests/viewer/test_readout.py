@@ -1,4 +1,4 @@
-"""What the panels say."""
+"""Texts of the panels."""
 
 import re
 from dataclasses import replace
@@ -24,7 +24,7 @@ def cells(html: str) -> list[list[str]]:
     return [[re.sub(r"<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", row)] for row in rows if "<td" in row]
 
 
-def test_table_holds_the_numbers_of_every_cable() -> None:
+def test_the_table_has_the_numbers_of_every_cable() -> None:
     snapshot = snapshot_at(ROBOT, sl.Pose([1.0, 0.5, 2.0], np.eye(3)), Settings(mass=50.0), None)
     plan = sl.inverse(ROBOT, sl.Pose([1.0, 0.5, 2.0], np.eye(3)))
     frequency = sl.modes(plan.state).frequency
@@ -54,7 +54,7 @@ def test_the_verdict_names_the_cable_that_is_nearest_to_its_limit() -> None:
     assert told["Spare force"].startswith(f"{extra:.1f} N")
 
 
-def test_limits_that_are_reached_are_no_margin_of_nothing() -> None:
+def test_a_margin_of_zero_is_shown_as_a_reached_limit() -> None:
     robot = sl.load_robot("article-mixed")
     pose = sl.Pose([0.0, 0.0, 3.0], np.eye(3))
     tension = sl.inverse(robot, pose).chord_tension
@@ -67,7 +67,7 @@ def test_limits_that_are_reached_are_no_margin_of_nothing() -> None:
     ("away", "told"),
     [(3e-13, "at"), (2e-6, "2 μm from"), (1.5e-3, "1.5 mm from")],
 )
-def test_what_is_rounding_is_no_distance(away: float, told: str) -> None:
+def test_rounding_is_not_shown_as_a_distance(away: float, told: str) -> None:
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     rest = sl.Pose([1.0, 0.5, 2.0 + away], np.eye(3))
     snapshot = replace(snapshot_at(ROBOT, pose, Settings(mass=50.0), None), rest=rest)
@@ -75,7 +75,7 @@ def test_what_is_rounding_is_no_distance(away: float, told: str) -> None:
     assert dict(re.findall("<dt>(.*?)</dt><dd>(.*?)</dd>", text))["Equilibrium"].startswith(told)
 
 
-def test_other_answers_than_a_proof_are_not_called_infeasible() -> None:
+def test_only_proved_poses_are_called_infeasible() -> None:
     on_anchor = snapshot_at(
         ROBOT, sl.Pose(ROBOT.frame_anchors[0] - ROBOT.platform_anchors[0], np.eye(3)), Settings(mass=50.0), None
     )
@@ -83,7 +83,7 @@ def test_other_answers_than_a_proof_are_not_called_infeasible() -> None:
     assert "coincide" in readout.verdict(on_anchor)
 
 
-def test_no_number_has_a_false_sign_or_runs_out_of_its_column() -> None:
+def test_numbers_have_correct_signs_and_fit_their_columns() -> None:
     turned = sl.Pose.from_euler([-1e-5, 0.0, 1.0], -1e-5, -1e-7, 0.0)
     text = readout.numbers_html(snapshot_at(ROBOT, turned, Settings(mass=50.0), None), SCALE, None)
     assert "-0.0" not in text
@@ -110,11 +110,11 @@ def test_infeasible_pose_shows_a_compromise_or_dashes_and_the_reason() -> None:
     assert snapshot.reason in readout.verdict(snapshot)
 
 
-def test_messages_are_no_markup() -> None:
+def test_messages_are_escaped() -> None:
     assert "<script>" not in readout.refused("<script>alert(1)</script>")
 
 
-def test_legend_names_its_ticks_in_their_places() -> None:
+def test_the_legend_has_its_ticks_in_their_places() -> None:
     found = re.findall(r"left:([\d.]+)%[^>]*>([\d.]+)<", readout.legend(SCALE, ROBOT))
     assert [text for _, text in found] == ["50", "100", "200", "500", "1000", "2000"]
     values = [float(text) for _, text in found]
@@ -122,7 +122,7 @@ def test_legend_names_its_ticks_in_their_places() -> None:
     assert [float(place) for place, _ in found] == pytest.approx(places, abs=0.06)
 
 
-def test_colors_of_cables_are_those_of_nothing_else() -> None:
+def test_colors_of_cables_are_unique() -> None:
     other = np.array([WANTED, ACTUAL, INFEASIBLE, PLATFORM, REST])
     lines = np.array([[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in COLORS])
     scale = SCALE.colors(np.geomspace(25.0, 2000.0, 60))

@@ -1,4 +1,4 @@
-"""Loads and cables of the workspace that the page shows: after a cut, under a push, and during a run."""
+"""Loads and cables of the region in the page: after a cut, with a push, and during a run."""
 
 import re
 from collections.abc import Iterator
@@ -48,7 +48,7 @@ def margin_of(robot: sl.Robot, pose: sl.Pose, wrench: np.ndarray | None = None) 
     return float(sl.margin(robot, pose, sl.WrenchBox(center=wrench)).value)
 
 
-def test_after_a_cut_the_remaining_cables_hold(page: Page) -> None:
+def test_after_a_cut_the_region_is_that_of_the_remaining_cables(page: Page) -> None:
     state = sl.inverse(ROBOT, POSE).state
     cut = PlayedSimulation(next(iter(simulate_cut(state, CUT, "none"))))
     moment = cut.at(cut.duration)

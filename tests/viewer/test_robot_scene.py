@@ -1,4 +1,4 @@
-"""The scene, as it is sent to clients."""
+"""The scene as sent to clients."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -28,7 +28,7 @@ def node(server: PageServer, name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
-def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: PageServer, name: str) -> None:
+def test_the_gizmo_is_smaller_than_the_robot(server: PageServer, name: str) -> None:
     robot = sl.load_robot(name)
     RobotScene(server.scene, robot, home_pose(robot))
     size = shapes.size_of(robot)
@@ -54,7 +54,7 @@ def test_every_robot_has_a_floor_and_a_scale(server: PageServer, name: str) -> N
     assert (arms[:, 1] - arms[:, 0]) / lengths[0] == pytest.approx(np.eye(3), abs=1e-6)
 
 
-def test_pulleys_turn_and_exit_points_move_with_the_platform(server: PageServer) -> None:
+def test_pulleys_and_exit_points_follow_the_platform(server: PageServer) -> None:
     robot = sl.load_robot("ipanema-2-pulleys")
     stage = RobotScene(server.scene, robot, home_pose(robot))
     wheels = node(server, "/pulleys")
@@ -75,7 +75,7 @@ def test_pulleys_turn_and_exit_points_move_with_the_platform(server: PageServer)
     assert np.linalg.norm(seen[1] - seen[0], axis=1).min() > 0.005
 
 
-def test_dead_cable_is_dashed_where_its_way_is_not_known(server: PageServer) -> None:
+def test_a_dead_length_of_unknown_direction_is_dashed(server: PageServer) -> None:
     base = sl.load_robot("article-suspended")
     rise = np.array([2.0, 2.0, 2.0, 2.0, 1.0, 1.0, 0.0, 0.0])
     winch = sl.Winch(pulley_radius=0.2, dead_cable=2.0, dead_rise=rise, drum_radius=0.2)

@@ -15,7 +15,7 @@ PLAN = sl.inverse(ROBOT, PATH, model=sl.Empirical())
 RUN = PlayedPlan(PLAN)
 
 
-def test_samples_are_those_of_the_plan() -> None:
+def test_samples_agree_with_the_plan() -> None:
     index = RUN.index_at(1.25)
     assert index == 12
     snapshot = RUN.at(1.25)
@@ -27,13 +27,13 @@ def test_samples_are_those_of_the_plan() -> None:
     assert snapshot.error == pytest.approx(found.pose.position - PATH.pose.position[12], abs=1e-9)
 
 
-def test_times_outside_are_the_nearer_end() -> None:
+def test_times_outside_give_the_nearer_end() -> None:
     assert RUN.index_at(-1.0) == 0
     assert RUN.index_at(1e9) == len(PATH) - 1
     assert RUN.duration == pytest.approx(4.0)
 
 
-def test_at_the_time_of_a_sample_it_is_that_sample() -> None:
+def test_the_time_of_a_sample_gives_that_sample() -> None:
     assert [RUN.index_at(float(time)) for time in RUN.time] == list(range(len(PATH)))
     assert RUN.index_at(float(np.nextafter(RUN.time[7], 0.0))) == 6
 

@@ -1,4 +1,4 @@
-"""What servers change for the whole process, and take back."""
+"""Changes of servers to the whole process, and their end."""
 
 import logging
 import warnings
@@ -8,7 +8,7 @@ from tests.viewer.client import await_that
 from tests.viewer.test_linking import a_page, asking, view
 
 
-def test_after_the_last_server_logging_and_warnings_are_as_before() -> None:
+def test_the_last_server_restores_logging_and_warnings() -> None:
     def state() -> tuple[object, ...]:
         return (*warnings.filters, *(logging.getLogger(name).level for name in LOUD))
 
@@ -21,7 +21,7 @@ def test_after_the_last_server_logging_and_warnings_are_as_before() -> None:
     assert state() == before
 
 
-def test_a_platform_on_end_is_no_news_to_the_terminal() -> None:
+def test_no_warning_is_printed_for_a_vertical_platform() -> None:
     with a_page() as page, asking(page) as here:
         assert "refused" not in here.ask("pose", "0,0,2.6,20,90,0")
         await_that(lambda: abs(view(page).snapshot.pose.matrix[2, 0]) > 0.999)

@@ -1,4 +1,4 @@
-"""A log as the page shows it: platforms, words, and what is added while it grows."""
+"""A log in the page: platforms, texts, and new data of a growing log."""
 
 import re
 from dataclasses import replace
@@ -55,7 +55,7 @@ def text_of(html: str) -> str:
     return " ".join(re.sub(r"<[^>]+>", " ", html).split())
 
 
-def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth: Path) -> None:
+def test_set_estimated_and_true_platforms_are_at_their_poses(log: Path, truth: Path) -> None:
     session, done, plan = session_of(log, truth), execution(), plan_of()
     assert session.duration == pytest.approx(2.0)
     early, late, silent = session.at(0.2), session.at(1.204), session.at(0.49)
@@ -73,7 +73,7 @@ def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth
     assert np.array_equal(late.length, done.length[120])
 
 
-def test_the_panel_tells_state_errors_and_what_happened(log: Path, truth: Path) -> None:
+def test_the_panel_shows_state_errors_and_events(log: Path, truth: Path) -> None:
     session, done = session_of(log, truth), execution()
     moment, scale = session.at(1.2), TensionScale.of(ROBOT)
     said = text_of(moment.verdict)
@@ -115,7 +115,7 @@ def handle(server: viser.ViserServer, name: str) -> Any:
 
 
 @extended
-def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path, truth: Path) -> None:
+def test_the_page_shows_three_platforms_and_follows_the_log(tmp_path: Path, truth: Path) -> None:
     file = tmp_path / "growing.mcap"
     plan, follower = plan_of(), LogFollower(file, truth)
     recorder = Recorder(file, ROBOT, epoch=0)
@@ -149,7 +149,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         stop_server(server)
 
 
-def test_a_timeline_that_grows_keeps_its_place_but_at_its_end() -> None:
+def test_a_growing_timeline_keeps_its_range_except_at_its_end() -> None:
     part, whole = PlayedSimulation(made.simulation(50)), PlayedSimulation(made.simulation())
     for before, playing, after in ((part.duration, False, 2.0), (0.5, False, 0.5), (0.5, True, 0.5)):
         player = Player(part, lambda _: None)
@@ -158,7 +158,7 @@ def test_a_timeline_that_grows_keeps_its_place_but_at_its_end() -> None:
         assert (player.duration, player.time, player.playing) == (2.0, after, playing)
 
 
-def test_what_is_planned_estimated_and_true_has_a_color_of_its_own() -> None:
+def test_planned_estimated_and_true_platforms_have_different_colors() -> None:
     colors = np.array([PLATFORM, ACTUAL, TRUTH, INFEASIBLE], dtype=float)
     apart = np.linalg.norm(colors[:, None] - colors[None], axis=2) + 1e3 * np.eye(4)
     assert apart.min() > 60.0
@@ -178,7 +178,7 @@ def contrast(one: np.ndarray, other: np.ndarray) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-def test_before_the_place_is_known_the_platform_is_shown_in_the_middle(log: Path) -> None:
+def test_a_platform_with_unknown_pose_is_shown_in_the_middle(log: Path) -> None:
     session = session_of(log)
     unknown = np.full((201, 3), np.nan)
     lost = replace(session, position=unknown, planned=unknown)

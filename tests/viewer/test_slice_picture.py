@@ -1,4 +1,4 @@
-"""A slice as a picture: its colors and lines where the margins say."""
+"""A slice as a picture: colors and lines of the margins."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ SCALE, UNIT = MarginScale(25.0), ForceUnit("N", 1.0, ".1f")
 
 
 @pytest.mark.parametrize("normal", [0, 1, 2])
-def test_lines_are_where_the_margin_is_round(normal: int) -> None:
+def test_lines_are_at_round_margins(normal: int) -> None:
     cut = slice_of(ball, Plane(normal, 0.3), LOW, HIGH, (40, 40))
     picture = picture_of(cut, SCALE, UNIT)
     assert np.all(picture.boundary[..., normal] == 0.3)
@@ -25,7 +25,7 @@ def test_lines_are_where_the_margin_is_round(normal: int) -> None:
     assert lengths.max() < 0.2  # nothing joins the end of a line to the begin of the next
 
 
-def test_each_line_says_its_margin_apart_from_the_others() -> None:
+def test_lines_have_their_margins_without_overlap() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (60, 60))
     marks = picture_of(cut, SCALE, UNIT).marks
     assert [text for text, _ in marks] == ["0 N", "−25 N", "25 N", "50 N", "75 N"]
@@ -50,7 +50,7 @@ def test_each_pixel_has_the_color_of_its_margin() -> None:
     np.testing.assert_array_equal(image[..., 3][sure], np.where(margin >= 0.0, INSIDE_OPACITY, OUTSIDE_OPACITY)[sure])
 
 
-def test_where_the_robot_is_singular_it_is_outside() -> None:
+def test_singular_poses_are_outside() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, np.array([1.9, 2.0, 2.0]), (60, 60))
     assert np.isinf(cut.margin).any()
     picture = picture_of(cut, SCALE, UNIT)

@@ -1,4 +1,4 @@
-"""One moment of a robot."""
+"""One state of a robot."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_snapshot_shows_the_plan_of_its_pose() -> None:
     assert snapshot.rest is None
 
 
-def test_margins_are_those_of_the_tension_that_is_limited() -> None:
+def test_margins_are_those_of_the_limited_tension() -> None:
     robot = ROBOT.replace(tension_limits_of="frame_end")
     snapshot = snapshot_at(robot, HERE, Settings(mass=50.0), None)
     plan = sl.inverse(robot, HERE)
@@ -45,12 +45,12 @@ def test_settings_change_the_robot() -> None:
     assert heavier.tension.sum() > 1.4 * snapshot_at(ROBOT, HERE, Settings(mass=50.0), None).tension.sum()
 
 
-def test_a_senseless_mass_is_refused() -> None:
+def test_an_invalid_mass_is_refused() -> None:
     with pytest.raises(sl.InvalidValueError):
         Settings(mass=np.nan).applied(ROBOT)
 
 
-def test_approximate_model_rests_where_forward_finds_it() -> None:
+def test_the_rest_pose_of_an_approximate_model_agrees_with_forward() -> None:
     snapshot = snapshot_at(ROBOT, HERE, Settings(mass=50.0, model=sl.Empirical()), None)
     lengths = sl.inverse(ROBOT, HERE, model=sl.Empirical()).unstrained_length
     found = sl.forward(ROBOT, lengths, start=HERE)
@@ -61,7 +61,7 @@ def test_approximate_model_rests_where_forward_finds_it() -> None:
     assert drawn - HERE.position == pytest.approx(100.0 * (found.pose.position - HERE.position), abs=1e-7)
 
 
-def test_infeasible_pose_says_by_how_much_and_which_cables() -> None:
+def test_an_infeasible_pose_has_shortfall_and_cables() -> None:
     outside = sl.Pose([7.2, 3.0, 1.5], np.eye(3))
     snapshot = snapshot_at(ROBOT, outside, Settings(mass=50.0), None)
     plan = sl.inverse(ROBOT, outside)
@@ -73,7 +73,7 @@ def test_infeasible_pose_says_by_how_much_and_which_cables() -> None:
     assert np.count_nonzero(sizes) == sizes.size // 2  # dashed
 
 
-def test_what_is_missing_is_told_in_the_unit_of_the_readings() -> None:
+def test_the_shortfall_has_the_unit_of_the_readings() -> None:
     heavy, outside = sl.load_robot("fast"), sl.Pose([100.0, 0.0, 200.0], np.eye(3))
     snapshot = snapshot_at(heavy, outside, Settings(mass=heavy.mass), None)
     missing = 1e-3 * float(sl.inverse(heavy, outside).shortfall)
@@ -82,7 +82,7 @@ def test_what_is_missing_is_told_in_the_unit_of_the_readings() -> None:
     assert "tension [kN]" in legend(TensionScale.of(heavy), heavy)
 
 
-def test_platform_on_an_anchor_is_no_accident() -> None:
+def test_a_platform_at_an_anchor_has_a_status() -> None:
     on_anchor = sl.Pose(ROBOT.frame_anchors[0] - ROBOT.platform_anchors[0], np.eye(3))
     snapshot = snapshot_at(ROBOT, on_anchor, Settings(mass=50.0), None)
     assert not snapshot.feasible
@@ -90,7 +90,7 @@ def test_platform_on_an_anchor_is_no_accident() -> None:
     assert np.isfinite(cable_segments(snapshot, 1.0)).all()
 
 
-def test_ghosts_are_drawn_only_where_they_are_apart_from_their_cables() -> None:
+def test_straight_lines_are_drawn_only_if_they_differ_from_cables() -> None:
     snapshot = snapshot_at(ROBOT, HERE, Settings(mass=50.0), None)
     assert snapshot.plan is not None
     sag = snapshot.plan.state.cables.sag
@@ -106,7 +106,7 @@ def test_ghosts_are_drawn_only_where_they_are_apart_from_their_cables() -> None:
         assert not drawn[:, [0, -1]].any()  # where both end at the same anchor
 
 
-def test_cables_over_pulleys_are_drawn_on_them_whether_they_hold_or_not() -> None:
+def test_cables_are_drawn_on_pulleys_at_all_poses() -> None:
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=0.2, dead_cable=2.0))
     outside = sl.Pose([7.2, 3.0, 1.5], np.eye(3))
     for pose, model in ((HERE, sl.Catenary()), (outside, sl.Elastic())):
@@ -128,7 +128,7 @@ def test_cables_over_pulleys_are_drawn_on_them_whether_they_hold_or_not() -> Non
             assert np.abs(courses[:, :, None] - exits[:, None, None]).sum(axis=3).min(axis=(1, 2)).max() < 1e-9
 
 
-def test_a_platform_dragged_into_a_pulley_says_so() -> None:
+def test_a_platform_inside_a_pulley_is_reported() -> None:
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=0.2))
     corner = ROBOT.frame_anchors[3] - ROBOT.platform_anchors[3]
     snapshot = snapshot_at(robot, sl.Pose(corner + np.array([0.1, 0.1, -1.0]), np.eye(3)), Settings(mass=50.0), None)

@@ -1,4 +1,4 @@
-"""The solid parts of a robot."""
+"""Solid parts of a robot."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ def test_every_preset_has_its_parts(name: str) -> None:
     assert np.all(np.abs(frame.bounds - [low, high]) < 0.01 * shapes.size_of(robot))
 
 
-def test_tube_is_as_long_and_thick_as_asked() -> None:
+def test_a_tube_has_the_given_length_and_thickness() -> None:
     points = np.linspace([0.0, 0.0, 0.0], [0.0, 3.0, 4.0], 9)
     area = mesh(shapes.tube(points, 0.1, sides=64)).area
     assert area == pytest.approx(2.0 * np.pi * 0.1 * 5.0, rel=2e-3)
@@ -48,7 +48,7 @@ def test_suspended_robot_without_a_frame_stands_on_the_floor() -> None:
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
-def test_frames_that_nobody_gave_are_dashed(name: str) -> None:
+def test_assumed_frames_are_dashed(name: str) -> None:
     robot = sl.load_robot(name)
     pieces = mesh(shapes.frame_solid(robot)).body_count
     assert pieces == 1 if not shapes.is_frame_assumed(robot) else pieces > 60
@@ -59,11 +59,11 @@ def test_frames_that_nobody_gave_are_dashed(name: str) -> None:
 @pytest.mark.parametrize(
     ("length", "rounded"), [(0.099, 0.05), (0.1, 0.1), (1.99, 1.0), (2.0, 2.0), (4.9, 2.0), (7.0, 5.0), (640.0, 500.0)]
 )
-def test_lengths_to_measure_by_are_round(length: float, rounded: float) -> None:
+def test_scale_bars_have_round_lengths(length: float, rounded: float) -> None:
     assert shapes.round_below(length) == pytest.approx(rounded, rel=1e-12)
 
 
-def test_a_pulley_stands_where_its_cable_enters_and_as_large_as_it_is() -> None:
+def test_a_pulley_is_at_the_entry_of_its_cable_with_its_radius() -> None:
     wheel = mesh(shapes.wheel())
     assert wheel.bounds[0] == pytest.approx([0.03, -0.1, -0.97], abs=0.01)  # entered at the origin, a bit of room
     assert wheel.bounds[1] == pytest.approx([1.97, 0.1, 0.97], abs=0.01)
@@ -72,7 +72,7 @@ def test_a_pulley_stands_where_its_cable_enters_and_as_large_as_it_is() -> None:
     assert across.max() <= 0.97 + 1e-12  # the cable, at 1, lies on it
 
 
-def test_pulleys_turn_to_the_platform() -> None:
+def test_pulleys_swivel_to_the_platform() -> None:
     robot = sl.load_robot("ipanema-2-pulleys")
     pose = sl.Pose.from_euler([0.5, -0.3, 2.0], 0.1, 0.0, 0.2)
     turned = Rotation.from_quat(np.roll(shapes.pulley_rotations(robot, pose), -1, axis=1)).apply([1.0, 0.0, 0.0])
@@ -81,7 +81,7 @@ def test_pulleys_turn_to_the_platform() -> None:
     assert turned == pytest.approx(reach / np.linalg.norm(reach, axis=1, keepdims=True), abs=1e-12)
 
 
-def test_marks_stay_where_no_pulley_is_seen_and_drums_are_drawn_where_they_are() -> None:
+def test_marks_replace_invisible_pulleys_and_drums_are_drawn() -> None:
     robot = sl.load_robot("ipanema-2")
     assert mesh(shapes.winch_solid(robot)).body_count == 8
     assert mesh(shapes.winch_solid(robot.replace(winches=sl.Winch(pulley_radius=0.01)))).body_count == 8
@@ -93,7 +93,7 @@ def test_marks_stay_where_no_pulley_is_seen_and_drums_are_drawn_where_they_are()
     assert drums.bounds[:, 2] == pytest.approx(robot.frame_anchors[[5, 3], 2] - 3.0 + [-0.25, 0.25], abs=0.005)
 
 
-def test_a_tube_leaves_out_points_that_repeat() -> None:
+def test_a_tube_omits_repeated_points() -> None:
     points = np.linspace([0.0, 0.0, 0.0], [0.0, 3.0, 4.0], 9)
     twice = np.repeat(points, 2, axis=0)
     assert np.array_equal(shapes.tube(twice, 0.1).vertices, shapes.tube(points, 0.1).vertices)

@@ -1,4 +1,4 @@
-"""The workspace in the page: nothing until it is asked for, then a slice, ways and a hull that follow."""
+"""The workspace in the page: no computation before a request, then slice, travel and hull follow the page."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -88,7 +88,7 @@ def client(page: Shown) -> Iterator[Client]:
 
 
 @extended
-def test_nothing_is_computed_until_it_is_asked_for(page: Shown, client: Client) -> None:
+def test_no_computation_before_a_request(page: Shown, client: Client) -> None:
     client.drag([0.5, 0.5, 2.0])
     await_that(lambda: page.position[0] == 0.5)
     assert not show_of(page).waiting
@@ -96,7 +96,7 @@ def test_nothing_is_computed_until_it_is_asked_for(page: Shown, client: Client) 
     assert "Choose one" in page.text
 
 
-def test_the_slice_follows_the_platform_and_ends_where_the_margin_does(page: Shown, client: Client) -> None:
+def test_the_slice_follows_the_platform_and_ends_at_zero_margin(page: Shown, client: Client) -> None:
     choose(page, client, slice=True, force=50.0)
     client.drag([0.0, 0.0, 3.0])
     await_that(lambda: page.position[2] == 3.0)
@@ -125,7 +125,7 @@ def test_a_slice_follows_a_drag_thirty_times_a_second(page: Shown, client: Clien
 
 
 @extended
-def test_ways_end_where_the_robot_can_no_more(page: Shown, client: Client) -> None:
+def test_travel_ends_at_infeasible_poses(page: Shown, client: Client) -> None:
     choose(page, client, ways=True, force=50.0)
     arrows = page.node("/travel")
     assert arrows is not None
@@ -139,7 +139,7 @@ def test_ways_end_where_the_robot_can_no_more(page: Shown, client: Client) -> No
 
 
 @extended
-def test_the_hull_comes_when_it_is_asked_for_and_is_colored_as_told(page: Shown, client: Client) -> None:
+def test_the_hull_is_shown_on_request_with_the_colors_of_the_legend(page: Shown, client: Client) -> None:
     show = show_of(page)
     choose(page, client, hull=True)
     await_that(lambda: "50 kg<" in page.text)  # said once the hull in full is drawn
@@ -160,7 +160,7 @@ def test_the_hull_comes_when_it_is_asked_for_and_is_colored_as_told(page: Shown,
 
 
 @extended
-def test_a_hull_follows_a_slider_and_the_one_before_stays_until_it_is_there(
+def test_a_hull_follows_a_slider_and_the_previous_one_stays_until_then(
     page: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     going, ended = threading.Event(), list[str]()
@@ -193,7 +193,7 @@ def test_a_hull_follows_a_slider_and_the_one_before_stays_until_it_is_there(
 
 
 @extended
-def test_a_wall_lights_up_near_the_platform_and_says_what_is_left(page: Shown, client: Client) -> None:
+def test_the_near_side_is_highlighted_with_its_margin(page: Shown, client: Client) -> None:
     choose(page, client, force=50.0, hull=True)
     await_that(lambda: "50 kg<" in page.text)  # the hull in full is drawn
     for place in ([1.0, 0.5, 2.0], [0.3, 0.3, 1.4]):  # the ball's tetrahedron ends at z = 1
@@ -212,7 +212,7 @@ def test_a_wall_lights_up_near_the_platform_and_says_what_is_left(page: Shown, c
 
 
 @extended
-def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows(
+def test_thirty_updates_a_second_while_a_region_follows_a_slider(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(MAKER, "hull", region_hull)
@@ -233,9 +233,7 @@ def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows
 
 
 @extended
-def test_a_hull_that_takes_long_shows_how_far_it_is(
-    page: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_slow_hull_shows_its_progress(page: Shown, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     going = threading.Event()
 
     def slow(asked: WorkspaceQuery, rough: bool, told: Callable[[int, int], None]) -> Hull:
@@ -255,7 +253,7 @@ def test_a_hull_that_takes_long_shows_how_far_it_is(
 
 @extended
 @pytest.mark.parametrize("load", [-1.0, float("nan"), 1e300])
-def test_loads_that_are_none_are_refused_in_words(page: Shown, client: Client, load: float) -> None:
+def test_invalid_loads_are_refused(page: Shown, client: Client, load: float) -> None:
     client.set(handle(page, "Force ± [N]"), load)
     client.set(handle(page, "Slice"), True)
     await_that(lambda: "Type a load" in page.text)

@@ -1,4 +1,4 @@
-"""What is copied as code, executed: the numbers on the screen, to the last bit."""
+"""Copied code, executed: the numbers on the screen, to the last bit."""
 
 import json
 import re
@@ -102,12 +102,12 @@ def a_case(seed: int) -> None:
 @pytest.mark.parametrize(
     ("start", "end"), [(0, 10), pytest.param(10, 40, marks=extended), pytest.param(40, 3000, marks=pytest.mark.soak)]
 )
-def test_code_gives_what_any_setting_shows(start: int, end: int) -> None:
+def test_code_agrees_with_the_page_for_any_setting(start: int, end: int) -> None:
     for seed in range(start, end):
         a_case(seed)
 
 
-def test_arguments_are_written_where_they_are_not_usual() -> None:
+def test_only_arguments_other_than_defaults_are_written() -> None:
     robot = sl.load_robot("cogiro")
     tension = sl.QuadraticProgram(target=300.0, variable="frame_end")
     set_to = Settings(robot.mass, model=sl.Empirical(k_h=5.0), tension=tension)
@@ -144,7 +144,7 @@ def test_a_sample_of_a_run_in_a_file(tmp_path: Path) -> None:
 
 
 @extended
-def test_beside_a_run_its_robot_is_that_of_the_file(tmp_path: Path) -> None:
+def test_the_robot_of_a_run_is_that_of_the_file(tmp_path: Path) -> None:
     robot, file = sl.load_robot("article-suspended"), tmp_path / "run.nc"
     sl.inverse(robot.replace(mass=77.0), path_of(robot)).save(file)
     set_to = Settings(77.0)
@@ -153,7 +153,7 @@ def test_beside_a_run_its_robot_is_that_of_the_file(tmp_path: Path) -> None:
     same(code_of(view, robot.replace(mass=77.0), Source.of_file("plan", file)), snapshot)
 
 
-def test_a_moment_of_a_simulation_in_a_file(tmp_path: Path) -> None:
+def test_a_time_of_a_simulation_in_a_file(tmp_path: Path) -> None:
     robot, file = sl.load_robot("article-suspended"), tmp_path / "cut.nc"
     state = sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).state
     sl.simulate(state, duration=0.2, events=(sl.Break(cable=0, time=0.05),)).save(file)
@@ -214,7 +214,7 @@ def test_rounding_errors_of_a_browser_are_not_copied(page: Shown) -> None:
 
 
 @extended
-def test_a_pose_that_is_typed_is_gone_to_and_another_is_refused_in_a_line(page: Shown) -> None:
+def test_a_typed_pose_is_shown_and_an_invalid_one_refused_in_a_line(page: Shown) -> None:
     assert asked(page, "pose", " 0.5, -0.25,1.75, 10, 0, 0 ", "a") == {"to": "a"}
     wanted = sl.Pose.from_euler([0.5, -0.25, 1.75], np.radians(10.0), 0.0, 0.0)
 
@@ -232,7 +232,7 @@ def test_a_pose_that_is_typed_is_gone_to_and_another_is_refused_in_a_line(page: 
 
 
 @pytest.mark.parametrize("value", wide([["a", 3], None, 3, [], ["a"], [3, "code"], ["x" * 50, "code"], {"to": "x"}]))
-def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> None:
+def test_invalid_requests_are_ignored(page: Shown, value: Any) -> None:
     with Client(page.url) as client:
         for topic in ("pose", "copy"):
             client.set(handle(page, "sagline"), json.dumps({"topic": topic, "value": value, "count": 0}))
@@ -241,7 +241,7 @@ def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> No
 
 
 @extended
-def test_what_is_in_no_file_is_refused_in_a_line() -> None:
+def test_states_without_a_file_are_refused_in_a_line() -> None:
     robot = sl.load_robot("article-suspended")
     run = PlayedPlan(sl.inverse(robot, path_of(robot)))
     with contextmanager(shown)(lambda server: Page(server, FEATURES, robot, run)) as page:

@@ -1,4 +1,4 @@
-"""A mode as it is drawn: its rest, its ends, its size and what is said of it."""
+"""A mode as drawn: rest position, cable ends, size and texts."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def swings(name: str, up_to: float = 8.0) -> list[Swing]:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "ipanema-2-pulleys"]))
-def test_at_rest_it_is_what_the_page_shows(name: str) -> None:
+def test_the_rest_position_is_that_of_the_page(name: str) -> None:
     for swing in swings(name):
         robot, pose = swing.state.one_robot, swing.state.pose
         seen = snapshot_at(robot, pose, Settings(robot.mass), None)
@@ -47,7 +47,7 @@ def test_cables_stay_on_the_platform_and_at_the_frame(name: str) -> None:
         assert 0.003 * size < max(farthest, np.linalg.norm(swing.motion[:3])) <= 0.0351 * size
 
 
-def test_it_says_how_much_larger_than_with_a_joule_it_is_drawn() -> None:
+def test_the_magnification_relative_to_a_joule_is_stated() -> None:
     """The energy of the drawn motion is that of a joule, times the square of the factor."""
     for swing in swings("cogiro", up_to=5.0):
         if swing.mode.kind != "massless":
@@ -65,7 +65,7 @@ def test_it_says_how_much_larger_than_with_a_joule_it_is_drawn() -> None:
         assert f"{2.0 * swing.mode.frequency:.3g} times slower" in swing.text
 
 
-def test_modes_are_asked_for_by_their_names() -> None:
+def test_modes_are_requested_by_name() -> None:
     robot = sl.load_robot("article-suspended")
     found = vibration(sl.inverse(robot, sl.Pose([0, 0, 1.5], np.eye(3))).state, up_to=3.0)
     second, light = mode_of(found, " 2 "), mode_of(found, "massless  3")

@@ -10,7 +10,7 @@ from sagline.viewer.tension_scale import GRAY, TensionScale, cable_color
 SCALE = TensionScale(10.0, 1000.0)
 
 
-def test_places_are_logarithmic_and_stay_at_the_ends() -> None:
+def test_positions_are_logarithmic_and_clipped_at_the_ends() -> None:
     shares = SCALE.fraction(np.array([1.0, 10.0, 100.0, 1000.0, 1e6]))
     assert shares == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
 
@@ -41,7 +41,7 @@ def lab(light: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("background", [WHITE, DARK])
-def test_no_tension_is_lost_on_either_background(background: tuple[int, int, int]) -> None:
+def test_all_tensions_are_visible_on_both_backgrounds(background: tuple[int, int, int]) -> None:
     colors = np.concatenate((SCALE.colors(np.geomspace(10.0, 1000.0, 200)), GRAY[None]))
     bright, other = luminance(colors), luminance(background)
     contrast = (np.maximum(bright, other) + 0.05) / (np.minimum(bright, other) + 0.05)
@@ -50,7 +50,7 @@ def test_no_tension_is_lost_on_either_background(background: tuple[int, int, int
 
 
 @pytest.mark.parametrize("sight", SIGHTS)
-def test_tensions_are_told_apart_whatever_colors_one_sees(sight: str) -> None:
+def test_tensions_are_distinguishable_with_color_blindness(sight: str) -> None:
     colors = SCALE.colors(np.geomspace(10.0, 1000.0, 9))
     seen = lab(linear(colors) @ np.transpose(SIGHTS[sight]))
     apart = np.linalg.norm(seen[:, None] - seen, axis=2)[~np.eye(9, dtype=bool)]
@@ -59,13 +59,13 @@ def test_tensions_are_told_apart_whatever_colors_one_sees(sight: str) -> None:
 
 
 @pytest.mark.parametrize("sight", SIGHTS)
-def test_eight_cables_are_told_apart_whatever_colors_one_sees(sight: str) -> None:
+def test_eight_cables_are_distinguishable_with_color_blindness(sight: str) -> None:
     seen = lab(linear([cable_color(k) for k in range(8)]) @ np.transpose(SIGHTS[sight]))
     apart = np.linalg.norm(seen[:, None] - seen, axis=2)[~np.eye(8, dtype=bool)]
     assert apart.min() > 20.0
 
 
-def test_linear_colors_come_back_through_the_srgb_curve() -> None:
+def test_linear_colors_are_inverted_by_the_srgb_curve() -> None:
     tension = np.geomspace(10.0, 1000.0, 9)
     linear = SCALE.linear_colors(tension) / 255.0
     back = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)

@@ -1,4 +1,4 @@
-"""The timeline: what its tracks say, and what is done on it, without a browser."""
+"""The timeline without a browser: contents of its tracks and actions on it."""
 
 import json
 import re
@@ -73,7 +73,7 @@ def growing(log: PlayedLog) -> Iterator[Shown]:
 
 
 @pytest.mark.parametrize("seed", wide(range(20), 5))
-def test_columns_hold_the_extremes_of_their_samples(seed: int) -> None:
+def test_columns_have_the_extrema_of_their_samples(seed: int) -> None:
     generator = np.random.default_rng(seed)
     count, most = int(generator.integers(2, 5000)), int(generator.integers(2, 300))
     time = np.cumsum(generator.uniform(1e-3, 1.0, count))
@@ -92,7 +92,7 @@ def test_columns_hold_the_extremes_of_their_samples(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", wide(range(20), 5))
-def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) -> None:
+def test_shaded_spans_cover_exactly_the_faulty_samples(seed: int) -> None:
     generator = np.random.default_rng(seed)
     count = int(generator.integers(2, 4000))
     time = np.cumsum(generator.uniform(0.01, 0.1, count))
@@ -113,7 +113,7 @@ def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) 
     assert len(spans) <= MOST_SPANS + 1
 
 
-def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
+def test_infeasible_spans_of_a_plan_have_reasons() -> None:
     track = PlayedPlan(PLAN).track()
     gaps = PLAN.gaps
     (before, gap, after), ((start, end, why),) = gaps, track.spans
@@ -125,7 +125,7 @@ def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
     assert why.endswith(f"cables {cables}")
 
 
-def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
+def test_the_page_receives_the_numbers_of_the_plan() -> None:
     track = PlayedPlan(PLAN).track()
     (part,) = timeline_message([("run", track)], 0, 8.0)["tracks"]
     low = np.array(part["low"], dtype=float)  # None as NaN
@@ -140,7 +140,7 @@ def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
     json.dumps(timeline_message([("run", track)], 0, 8.0), allow_nan=False)
 
 
-def test_limits_are_drawn_where_they_are_near_and_told_where_not() -> None:
+def test_limits_within_the_range_are_drawn_and_others_stated() -> None:
     time, limits = (
         np.linspace(0.0, 1.0, 11),
         ((25.0, "lowest", False), (2000.0, "highest", True)),
@@ -153,7 +153,7 @@ def test_limits_are_drawn_where_they_are_near_and_told_where_not() -> None:
 
 
 @pytest.mark.parametrize("seed", wide(range(20), 5))
-def test_what_is_looked_at_closer_is_all_there_and_finer(seed: int) -> None:
+def test_a_zoomed_range_has_finer_data(seed: int) -> None:
     generator = np.random.default_rng(seed)
     time = np.cumsum(generator.uniform(1e-3, 1.0, 4000))
     time -= time[0]
@@ -173,7 +173,7 @@ def test_what_is_looked_at_closer_is_all_there_and_finer(seed: int) -> None:
     assert len(part["times"]) == min(len(known), MOST_COLUMNS)
 
 
-def test_of_two_tracks_both_have_one_axis_and_the_chart_that_was_chosen() -> None:
+def test_two_tracks_have_one_axis_and_the_chosen_chart() -> None:
     time = np.linspace(0.0, 1.0, 3)
 
     def track(titles: str, size: float) -> Track:
@@ -186,7 +186,7 @@ def test_of_two_tracks_both_have_one_axis_and_the_chart_that_was_chosen() -> Non
     assert [part["title"] for part in page["tracks"]] == ["B", "A"]  # no B: what is in its place
 
 
-def test_a_simulation_says_when_it_broke_and_draws_nothing_of_a_broken_cable() -> None:
+def test_a_simulation_marks_a_break_and_omits_the_broken_cable() -> None:
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
     cut = sl.simulate(state, duration=1.0, events=sl.Break(cable=3, time=0.5))
     track = PlayedSimulation(cut).track()
@@ -219,7 +219,7 @@ def test_a_log_marks_its_events_and_shades_its_faults(log: PlayedLog) -> None:
     assert why == "FAULT"
 
 
-def test_steps_go_from_sample_to_sample() -> None:
+def test_steps_move_from_sample_to_sample() -> None:
     track = Track(np.array([0.0, 0.1, 0.4, 0.5]), ())
     assert [track.step_from(0.1, steps) for steps in (1, 2, 9, -1, -9, 0)] == [0.4, 0.5, 0.5, 0.0, 0.0, 0.1]
     assert track.step_from(0.3, 1) == 0.4
@@ -248,7 +248,7 @@ def test_scrubbing_shows_that_sample_in_both_runs(page: Shown) -> None:
 
 
 @extended
-def test_play_and_speed_are_heard_and_the_clock_is_told_at_most_thirty_times_a_second(page: Shown) -> None:
+def test_play_and_speed_work_with_thirty_clock_messages_per_second(page: Shown) -> None:
     with Client(page.url) as client:
         tell(page, client, "speed", 4.0)
         tell(page, client, "scrub", 0.0)
@@ -265,7 +265,7 @@ def test_play_and_speed_are_heard_and_the_clock_is_told_at_most_thirty_times_a_s
         await_that(lambda: page.told("clock")["speed"] == 1.0)
 
 
-def test_a_chart_is_chosen_and_a_cable_that_is_pointed_at_is_bold(page: Shown) -> None:
+def test_a_chart_is_chosen_and_the_cable_at_the_pointer_is_bold(page: Shown) -> None:
     with Client(page.url) as client:
         tell(page, client, "chart", 1)
         await_that(lambda: page.told("timeline")["tracks"][0]["title"] == "Unstrained length")
@@ -282,7 +282,7 @@ def test_a_chart_is_chosen_and_a_cable_that_is_pointed_at_is_bold(page: Shown) -
 
 
 @extended
-def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
+def test_zooming_in_and_out(page: Shown) -> None:
     with Client(page.url) as client:
         tell(page, client, "window", [2.0, 4.0])
         await_that(lambda: page.told("timeline")["window"] == [2.0, 4.0])
@@ -305,7 +305,7 @@ def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
         list(client.heard(0.1))  # who has not heard all takes ten seconds to leave
 
 
-def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> None:
+def test_a_zoomed_range_follows_the_clock() -> None:
     server = start_server(port=0)
     try:
         page = Page(server, (), ROBOT, PlayedPlan(PLAN))
@@ -332,7 +332,7 @@ def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> Non
 
 
 @extended
-def test_a_log_that_grows_grows_on_the_page_and_who_is_at_its_end_stays_there(growing: Shown, log: PlayedLog) -> None:
+def test_a_growing_log_is_followed_at_its_end(growing: Shown, log: PlayedLog) -> None:
     with Client(growing.url) as client:
         tell(growing, client, "chart", 1)
         tell(growing, client, "scrub", 99.0)
@@ -357,7 +357,7 @@ NONSENSE: dict[str, tuple[Any, ...]] = {
 }
 
 
-def test_nonsense_changes_nothing(page: Shown) -> None:
+def test_invalid_messages_are_ignored(page: Shown) -> None:
     with Client(page.url) as client:
         tell(page, client, "scrub", 2.0)
         await_that(lambda: page.told("clock")["time"] == 2.0)
@@ -374,7 +374,7 @@ def test_nonsense_changes_nothing(page: Shown) -> None:
         assert page.thread.is_alive()
 
 
-def test_what_a_cut_brought_is_played_alone_and_given_back_with_its_second_run() -> None:
+def test_a_cut_is_played_alone_and_undo_restores_both_runs() -> None:
     run, other = PlayedPlan(PLAN), Beside(PlayedPlan(OTHER), ("a", "b"))
     player = Player(run, lambda *_: None, other)
     assert (player.beside, player.duration) == (other, 9.0)
@@ -386,7 +386,7 @@ def test_what_a_cut_brought_is_played_alone_and_given_back_with_its_second_run()
 
 
 @extended
-def test_a_long_run_is_told_at_once() -> None:
+def test_a_long_run_is_sent_quickly() -> None:
     """600,000 samples of eight cables: the page is told in a blink."""
     time = np.linspace(0.0, 600.0, 600_000)
     values = np.random.default_rng(1).normal(size=(600_000, 8))

@@ -1,4 +1,4 @@
-"""The viewer with clients that drag, set, leave and talk nonsense."""
+"""The viewer with clients that drag, change controls, close and send invalid messages."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -33,12 +33,12 @@ def film() -> Iterator[Shown]:
     yield from shown(lambda server: Page(server, FEATURES, ROBOT, a_run()))
 
 
-def test_it_listens_on_the_loopback_address_alone(page: Shown) -> None:
+def test_the_viewer_listens_on_the_loopback_address_only(page: Shown) -> None:
     assert page.server.get_host() == "127.0.0.1"
     assert page.server.request_share_url() is None
 
 
-def test_a_port_that_is_taken_is_told(page: Shown) -> None:
+def test_a_port_in_use_is_reported(page: Shown) -> None:
     port = page.server.get_port()
     with refused(f"port {port}", "in use on 127.0.0.1", kind=sl.InvalidValueError):
         start_server(port=port)
@@ -48,7 +48,7 @@ def test_a_port_that_is_taken_is_told(page: Shown) -> None:
         start_server(port=70000)
 
 
-def test_the_gizmo_goes_where_it_is_put() -> None:
+def test_the_gizmo_moves_to_a_set_pose() -> None:
     server = start_server(port=0)
     try:
         pose = sl.Pose.from_euler([1.0, 0.5, 2.0], 0.3, -0.2, 0.1)
@@ -61,7 +61,7 @@ def test_the_gizmo_goes_where_it_is_put() -> None:
         stop_server(server)
 
 
-def test_everything_follows_a_drag(page: Shown) -> None:
+def test_all_parts_follow_a_drag(page: Shown) -> None:
     with Client(page.url) as client:
         client.grab()
         half = np.radians(4.0) / 2.0
@@ -86,7 +86,7 @@ def test_thirty_updates_a_second_reach_a_client(page: Shown) -> None:
         assert best_rate(lambda: updates_a_second(page, client, move), 30.0) >= 30.0
 
 
-def test_infeasible_pose_turns_the_platform_red_and_back(page: Shown) -> None:
+def test_an_infeasible_pose_colors_the_platform_red(page: Shown) -> None:
     with Client(page.url) as client:
         client.drag([7.2, 3.0, 1.5])
         await_that(lambda: page.viewer.view is not None and not page.viewer.view.snapshot.feasible)
@@ -110,7 +110,7 @@ def test_a_slider_changes_the_robot(page: Shown) -> None:
 
 
 @extended
-def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Shown) -> None:
+def test_tensions_of_a_pose_do_not_depend_on_the_path(page: Shown) -> None:
     generator = np.random.default_rng(20)
     method = handle(page, "Tensions")
     forget = handle(page, "Reset history")
@@ -140,7 +140,7 @@ def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Show
 
 
 @extended
-def test_a_client_that_vanishes_mid_drag_is_not_missed(page: Shown) -> None:
+def test_a_client_lost_during_a_drag_has_no_effect(page: Shown) -> None:
     client = Client(page.url)
     client.grab()
     client.drag([0.3, 0.0, 2.0])
@@ -151,7 +151,7 @@ def test_a_client_that_vanishes_mid_drag_is_not_missed(page: Shown) -> None:
 
 
 @extended
-def test_ten_clients_at_once_all_see_the_drag_of_one(page: Shown) -> None:
+def test_ten_clients_see_the_drag_of_one(page: Shown) -> None:
     with clients(page.url, 10) as some:
         for client in some:
             client.replayed()
@@ -165,7 +165,7 @@ def test_ten_clients_at_once_all_see_the_drag_of_one(page: Shown) -> None:
     "nonsense",
     wide([b"\xff\xfe\x00", b"", "text", b"\x81\xa4type\xa4None", b"\x80"]),
 )
-def test_a_malformed_message_harms_its_sender_only(page: Shown, nonsense: bytes | str) -> None:
+def test_a_malformed_message_affects_only_its_sender(page: Shown, nonsense: bytes | str) -> None:
     with Client(page.url) as good:
         bad = Client(page.url)
         bad.send(nonsense)
@@ -181,7 +181,7 @@ def heard_or_cut_off(page: Shown, client: int, heard: list[int]) -> bool:
 
 
 @extended
-def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
+def test_an_invalid_pose_is_refused_and_discarded(page: Shown) -> None:
     asked: list[int] = []
     page.viewer.channel.on("asked", lambda _, number: asked.append(number))
     for position, wxyz in (
@@ -204,7 +204,7 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
         await_that(lambda: page.position[1] == 0.4)
 
 
-def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> None:
+def test_values_beyond_a_slider_are_refused_once() -> None:
     server = start_server(port=0)
     try:
         viewer = Page(server, FEATURES, ROBOT)
@@ -222,7 +222,7 @@ def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> N
 
 
 @extended
-def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
+def test_a_run_plays_pauses_and_ends_with_a_drag(film: Shown) -> None:
     with Client(film.url) as client:
         assert np.array_equal(film.position, PATH.pose.position[0])
         tell(film, client, "play", True)

@@ -1,4 +1,4 @@
-"""The wall that lights up: its faces near the platform, in the colors of their cables, the nearer the more."""
+"""The highlighted side of the region near the platform, in the colors of the cables, brighter at smaller distances."""
 
 import re
 from itertools import pairwise
@@ -29,13 +29,13 @@ def area(vertices: np.ndarray, faces: np.ndarray) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0)
 
 
-def test_nothing_is_lit_from_afar() -> None:
+def test_no_side_is_highlighted_from_far_away() -> None:
     assert near_patches(wall(), np.array([-0.1, 0.0, 0.0]), 1.0) == []
     assert near_patches(wall(on_box=True), np.array([0.9, 0.0, 0.0]), 1.0) == []  # where the box ends there is no wall
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.3, -0.5])
-def test_what_is_near_is_lit_the_nearer_the_more(distance: float) -> None:
+def test_near_sides_are_brighter(distance: float) -> None:
     place = np.array([1.0 - distance, 0.5, 0.0])
     found = near_patches(wall(), place, 1.0)
     assert {patch.color for patch in found} == {cable_color(2), cable_color(5)}
@@ -54,7 +54,7 @@ def test_what_is_near_is_lit_the_nearer_the_more(distance: float) -> None:
         assert np.all((height > -0.11) if patch.color == cable_color(2) else (height < 0.11))
 
 
-def test_what_is_left_is_said() -> None:
+def test_the_remaining_margin_is_stated() -> None:
     newtons, kilonewtons = ForceUnit("N", 1.0, ".1f"), ForceUnit("kN", 1e3, ".2f")
     assert margin_text(82.34, 3, newtons) == "82.3 N left, cable 3"
     assert re.findall(r"[\d.]+|kN|too", margin_text(-1520.0, 0, kilonewtons)) == ["1.52", "kN", "too", "0"]

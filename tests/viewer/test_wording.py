@@ -1,4 +1,4 @@
-"""How numbers and names are written."""
+"""Notation of numbers and names."""
 
 import numpy as np
 import pytest
@@ -9,11 +9,11 @@ from sagline.viewer.tension_scale import ForceUnit, number_text
 
 
 @pytest.mark.parametrize("value", [-0.04, -1e-300, -0.0, 0.0, 0.049])
-def test_what_rounds_to_zero_has_no_sign(value: float) -> None:
+def test_numbers_rounded_to_zero_have_no_sign(value: float) -> None:
     assert number_text(value, ".1f") == "0.0"
 
 
-def test_no_number_is_a_dash() -> None:
+def test_nan_is_a_dash() -> None:
     assert number_text(np.nan, ".1f") == number_text(np.inf, ".3f") == "–"
 
 
@@ -23,7 +23,7 @@ def test_forces_of_a_robot_keep_one_unit() -> None:
     assert ForceUnit.up_to(1.2e6).written(-1e-9) == "0.00 kN"
 
 
-def test_the_choices_are_named_as_the_readings_name_them() -> None:
+def test_choices_have_the_names_in_the_readings() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([0.5, 0.2, 2.0], np.eye(3))
     assert all(model_name(model) == name for name, model in MODELS.items())
@@ -32,7 +32,7 @@ def test_the_choices_are_named_as_the_readings_name_them() -> None:
         assert snapshot.origin == f"catenary (exact), {name}"
 
 
-def test_by_default_nothing_is_remembered() -> None:
+def test_by_default_tensions_do_not_depend_on_the_path() -> None:
     assert not depends_on_history(Settings(mass=1.0).tension)
     assert not depends_on_history(next(iter(METHODS.values())))
     (name,) = (name for name, method in METHODS.items() if depends_on_history(method))
