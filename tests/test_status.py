@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 import sagline as sl
-from sagline.core.status import Status
+from sagline.core.results import Status
 from sagline.kernels import codes
 
 # kernels do not return NO_POSE: invalid poses do not reach them

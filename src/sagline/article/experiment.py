@@ -21,7 +21,7 @@ from sagline import control
 from sagline.article.ten_poses import HOME, Table2, table2
 from sagline.control.link import PERIOD
 from sagline.core.arrays import Array, locked
-from sagline.core.status import Status
+from sagline.core.results import Status
 
 PROTOTYPE: Final = "article-prototype"
 SPEED: Final = 0.06  # largest speed of the platform [m/s]; the fastest winch then has 61 mm/s

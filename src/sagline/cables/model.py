@@ -16,8 +16,7 @@ from sagline.core.arrays import Array, Codes, broadcast_shape, checked, kernel_i
 from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.core.indices import batch_length, part_of
 from sagline.core.memory import check_memory
-from sagline.core.results import Result
-from sagline.core.status import Status
+from sagline.core.results import Result, Status
 from sagline.kernels import codes
 from sagline.kernels.cable import batch
 from sagline.kernels.cable.terms import Terms

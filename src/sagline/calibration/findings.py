@@ -17,8 +17,7 @@ from sagline.calibration.observations import unwhitened_slopes
 from sagline.calibration.parameters import Parameters, internal, prior_root, prior_units, slopes_of_values
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.indices import evenly_spaced
-from sagline.core.results import Result
-from sagline.core.status import Status
+from sagline.core.results import Result, Status
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, Flags
-from sagline.core.status import Status
+from sagline.core.results import Status
 
 Whole: TypeAlias = NDArray[np.int64]
 

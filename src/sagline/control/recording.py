@@ -15,7 +15,7 @@ from sagline.control.states import State
 from sagline.core.arguments import brief
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.core.status import Status
+from sagline.core.results import Status
 from sagline.kinematics.plan import Plan
 
 

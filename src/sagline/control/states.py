@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from sagline.core.errors import MOST, SaglineError, shortened
-from sagline.core.status import Status
+from sagline.core.results import Status
 
 
 class State(Status):

@@ -1,4 +1,4 @@
-"""Common base classes of results: immutable, pickled by field, displayed in notebooks, saved to files."""
+"""Common base classes of results: immutable, pickled by field, displayed in notebooks, saved to files; status codes."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import os
 import re
 from contextlib import suppress
 from dataclasses import fields
+from enum import IntEnum
 from importlib import import_module
 from inspect import getdoc
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -123,3 +124,20 @@ def _again(kind: type[ByFields], values: dict[str, Any]) -> ByFields:
                 locked(part)
         object.__setattr__(made, name, value)
     return made
+
+
+class Status(IntEnum):
+    """Outcome of a calculation. Each member has a code and an explanatory sentence.
+
+    Attributes:
+        text: Meaning of the outcome, and next step, in one sentence.
+    """
+
+    text: str
+
+    def __new__(cls, code: int, text: str = "") -> Self:
+        """Create a member with its code as value."""
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.text = text
+        return member

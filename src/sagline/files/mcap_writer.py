@@ -27,7 +27,7 @@ from sagline.control.recording import CycleTable, Event, Recorded
 from sagline.core.arguments import file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError
-from sagline.core.status import Status
+from sagline.core.results import Status
 from sagline.files import mcap_layout
 from sagline.files.packed import pack, pack_dataset, round_decimals
 from sagline.files.plan_file import plan_dataset

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.core.status import Status
+from sagline.core.results import Status
 from sagline.kernels import codes
 
 

@@ -17,8 +17,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.numbers import counted, n
 from sagline.core.progress import Progress, blocks
-from sagline.core.results import Result
-from sagline.core.status import Status
+from sagline.core.results import Result, Status
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import codes, tables
 from sagline.kernels.memory import memory_for

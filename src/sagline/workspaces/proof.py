@@ -16,8 +16,7 @@ from sagline.core.arrays import Array, Codes, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.progress import Progress
-from sagline.core.results import Result
-from sagline.core.status import Status
+from sagline.core.results import Result, Status
 from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN, OUTSIDE, memory_for_proofs, prove_boxes
 from sagline.robot.pose import PoseBox
 from sagline.robot.reach import check_cable_count
