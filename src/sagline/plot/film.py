@@ -83,7 +83,10 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     ax.scatter(*robot.frame_anchors.T, color="black", s=7.0, depthshade=False)
     for artist in ax.get_children():
         artist.set_clip_on(False)  # the axes are square, but the picture is wider than high
-    _frame(ax, swing)
+    points = swing.rest.reshape(-1, 3)
+    ax.set_box_aspect(fit_space(ax, points.min(axis=0), points.max(axis=0)), zoom=1.5)
+    ax.set_axis_off()
+    ax.view_init(elev=18.0, azim=-62.0)
     ax.set_title(f"{robot.name}, mode {mode.number}: {mode.frequency:.3f} Hz {mode.kind}", fontsize=LABEL, y=0.97)
     figure.text(0.5, 0.02, f"{energy_shares(mode)}; {swing.text}", fontsize=TICK, ha="center")
     drawn = []
@@ -109,11 +112,3 @@ def energy_shares(mode: ListedMode) -> str:
     if mode.cable is None or mode.cable_share < LEAST_SHARE:
         return f"{words}, each cable less than {100.0 * LEAST_SHARE:g} %"
     return f"{words}, cable {mode.cable} {100.0 * mode.cable_share:.0f} %"
-
-
-def _frame(ax: Axes3D, swing: Swing) -> None:
-    """Set the limits of the view, with equal scales along all axes and without numbers."""
-    points = swing.rest.reshape(-1, 3)
-    ax.set_box_aspect(fit_space(ax, points.min(axis=0), points.max(axis=0)), zoom=1.5)
-    ax.set_axis_off()
-    ax.view_init(elev=18.0, azim=-62.0)

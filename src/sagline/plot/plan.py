@@ -346,7 +346,6 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 def _arrow_samples(path: Path) -> list[int]:
     """Samples of the arrows, before the middle of each motion between two rests; of many motions, an even selection."""
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
-    moving = np.concatenate(([False], speed > 1e-3 * speed.max(initial=0.0), [False]))
-    edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)
-    chosen = edges[np.unique(np.linspace(0, len(edges) - 1, min(len(edges), MOST_ARROWS)).astype(np.intp))]
-    return [int(first + 0.42 * (end - first)) for first, end in chosen]
+    moves = np.array(sheet.true_runs(speed > 1e-3 * speed.max(initial=0.0)), dtype=np.intp).reshape(-1, 2)
+    chosen = moves[np.unique(np.linspace(0, len(moves) - 1, min(len(moves), MOST_ARROWS)).astype(np.intp))]
+    return [int(first + 0.42 * (last + 1 - first)) for first, last in chosen]

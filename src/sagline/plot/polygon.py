@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -122,14 +122,8 @@ def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array
     return groups
 
 
-class _Name(NamedTuple):
-    """Name of a side: middle of the side [N], offset and half size of the name [pt]; True if it is moved outward."""
-
-    text: str
-    middle: Array
-    offset: Array
-    half: Array
-    moved: bool
+# name of a side: text, middle of the side [N], offset and half size of the name [pt]; True if it is moved outward
+_Name: TypeAlias = "tuple[str, Array, Array, Array, bool]"
 
 
 def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
@@ -139,7 +133,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
         figure.draw_without_rendering()  # the layout determines the size of the polygon on the sheet
         scale = ax.bbox.width / (figure.dpi * POINT) / float(np.ptp(ax.get_xlim()))  # points per newton
         names = _names(shape, corners, scale)
-        reach = np.array([name.middle + (name.offset + sign * name.half) / scale for name in names for sign in (-1, 1)])
+        reach = [middle + (away + sign * half) / scale for _, middle, away, half, _ in names for sign in (-1, 1)]
         seen = np.array([ax.get_xlim(), ax.get_ylim()]).T
         wanted = np.array([np.min([seen[0], *reach], axis=0), np.max([seen[1], *reach], axis=0)])
         if np.array_equal(wanted, seen):
@@ -147,8 +141,8 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
         wanted += (wanted != seen) * np.array([[-SPARE], [SPARE]]) * np.ptp(wanted, axis=0)
         ax.set(xlim=wanted[:, 0], ylim=wanted[:, 1])
     line = {"arrowstyle": "-", "color": "0.75", "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 2.0}
-    for name in names:
-        write_beside(ax, name.text, name.middle, name.offset, color="0.3", arrowprops=line if name.moved else None)
+    for text, middle, away, _, moved in names:
+        write_beside(ax, text, middle, away, color="0.3", arrowprops=line if moved else None)
 
 
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
@@ -164,11 +158,11 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
         half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=size).get_extents().width + 4.0, 1.3 * size])
         away = least = GAP + half @ np.abs(out)  # distance at which the whole box of the name is outside of the line
         while any(
-            np.all(np.abs(scale * (middle - name.middle) + away * out - name.offset) < half + name.half + 1.0)
-            for name in names
+            np.all(np.abs(scale * (middle - other) + away * out - place) < half + size_of_other + 1.0)
+            for _, other, place, size_of_other, _ in names
         ):
             away += 0.5 * size
-        names.append(_Name(text, middle, away * out, half, bool(away > least)))
+        names.append((text, middle, away * out, half, bool(away > least)))
     return names
 
 
