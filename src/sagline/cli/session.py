@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from queue import Empty, SimpleQueue
 from threading import Thread
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -23,9 +23,7 @@ from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array
 from sagline.core.errors import nearest
-from sagline.files.path_file import load_path
 from sagline.files.pose_text import pose_of_text
-from sagline.robot.pose import Pose
 
 EVERY: Final = 0.2  # time between two updates of the status line [s]
 PROMPT: Final = "> "
@@ -87,11 +85,8 @@ class StatusLine:
         sys.stdout.flush()
 
 
-class _Line(NamedTuple):
-    """A line: its text (None at the end of the input) and its action; for an invalid line, it raises the error."""
-
-    text: str | None
-    act: Callable[[], object]
+# text of a line ("" at the end of the input) and its action; for an invalid line, the action raises the error
+_Line = tuple[str, Callable[[], object]]
 
 
 class OperatorSession:
@@ -115,7 +110,7 @@ class OperatorSession:
                 self._home,
             ),
             "goto": ("X,Y,Z[,A,B,C]", "move straight to a pose [m, degrees]", partial(_pose, "goto"), self._go_to),
-            "run": ("FILE", "follow a path, path.yaml", load_path, control.start),
+            "run": ("FILE", "follow a path, path.yaml", sl.load_path, control.start),
             "jog": (
                 "WINCH|AXIS LENGTH",
                 "jog 3 +5mm: winch 3 (the first is 0); jog z -10mm: the platform",
@@ -142,7 +137,7 @@ class OperatorSession:
                 while not self._ended and not self._is_interrupted:
                     self._cycle()
                     if (line := self._next_line()) is not None:
-                        self._carry_out(line)
+                        self._carry_out(*line)
         finally:
             with interrupt_calls(lambda: None):
                 self._disconnect()
@@ -168,13 +163,13 @@ class OperatorSession:
         for line in sys.stdin:
             for part in line.split(";"):
                 self._lines.put(self._parse(part.strip()))
-        self._lines.put(_Line(None, self._end))
+        self._lines.put(("", self._end))
 
     def _parse(self, text: str) -> _Line:
         """Parse a line; for an invalid line, the returned action raises the error."""
         word, _, rest = text.partition(" ")
         if not word or word.startswith("#"):
-            return _Line("", lambda: None)
+            return "", lambda: None
         try:
             if word not in self._words:
                 near = nearest(word, self._words)
@@ -182,9 +177,9 @@ class OperatorSession:
                 raise sl.InvalidValueError("the line", repr(text), "one that begins with a known word", step)
             _, _, parse, act = self._words[word]
             arguments = parse(rest.strip())
-            return _Line(text, act if parse is _nothing else partial(act, arguments))
+            return text, act if parse is _nothing else partial(act, arguments)
         except sl.SaglineError as error:
-            return _Line(text, partial(_refuse, error))
+            return text, partial(_refuse, error)
 
     def _interrupt(self) -> None:
         self._is_interrupted = True
@@ -225,12 +220,12 @@ class OperatorSession:
         except Empty:
             return None
 
-    def _carry_out(self, line: _Line) -> None:
+    def _carry_out(self, text: str, act: Callable[[], object]) -> None:
         """Carry out a line. An error of an operator's line is printed. An error in a pipe ends the session."""
-        if self._alone and line.text:
-            show_text(f"{PROMPT}{line.text}", whole=True)
+        if self._alone and text:
+            show_text(f"{PROMPT}{text}", whole=True)
         try:
-            line.act()
+            act()
         except sl.SaglineError as error:
             if self._alone:
                 raise
@@ -238,16 +233,16 @@ class OperatorSession:
         self._show_events()
         self._line.ask()
 
-    def _go_to(self, pose: Pose) -> None:
+    def _go_to(self, pose: sl.Pose) -> None:
         self.control.start(self.control.path_to(pose))
 
-    def _home_pose(self, text: str) -> Pose | None:
+    def _home_pose(self, text: str) -> sl.Pose | None:
         """The pose at which to home; None confirms the last pose."""
         if text == CONFIRM:
             return None
         return _pose("home", text) if text else opt.middle_pose(self.control.robot)
 
-    def _home(self, pose: Pose | None) -> None:
+    def _home(self, pose: sl.Pose | None) -> None:
         if pose is None:
             self.control.confirm_homing()
         else:
@@ -312,7 +307,7 @@ class OperatorSession:
             show_text(f"{usage.ljust(wide)}  {text}")
 
 
-def _pose(item: str, text: str) -> Pose:
+def _pose(item: str, text: str) -> sl.Pose:
     if not text:
         raise sl.InvalidValueError(item, "without a pose", "X,Y,Z or X,Y,Z,A,B,C", f"Enter {item} 0.2,-0.4,1.4.")
     return pose_of_text(text, item, f"Give meters, and degrees about z, y and x: {item} 0.2,-0.4,1.4.")

@@ -130,11 +130,6 @@ class ConfirmedRun(NamedTuple):
         return self.confirmation.plan
 
     @property
-    def name(self) -> str:
-        """Name of the files: robot and model."""
-        return run_name(self.plan.state.one_robot, self.plan.state.cables.model)
-
-    @property
     def lost(self) -> int:
         """Number of planned poses without a stable equilibrium of the platform."""
         stays = self.confirmation.held
