@@ -19,14 +19,7 @@ from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
-from sagline.viewer.timeline import (
-    Chart,
-    Track,
-    cable_names,
-    chart_limits,
-    infeasible_spans,
-    limit_violations,
-)
+from sagline.viewer.timeline import Chart, Track, cable_names, chart_limits, infeasible_spans, limit_violations
 
 CABLES: Final = {
     "none": "massless cables",

@@ -145,10 +145,7 @@ class Player:
     """
 
     def __init__(
-        self,
-        original: Played | None,
-        put_on: Callable[[Played | None], None],
-        beside: Beside | None = None,
+        self, original: Played | None, put_on: Callable[[Played | None], None], beside: Beside | None = None
     ) -> None:
         """Play the motion `original`, or no motion for None. `put_on` is called whenever another motion is played."""
         self._put_on, self._original, self._beside = put_on, original, beside

@@ -23,15 +23,7 @@ from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
 from sagline.viewer.tension_scale import force_unit, number_text
-from sagline.viewer.timeline import (
-    Chart,
-    Span,
-    Track,
-    cable_names,
-    chart_limits,
-    limit_violations,
-    spans_of,
-)
+from sagline.viewer.timeline import Chart, Span, Track, cable_names, chart_limits, limit_violations, spans_of
 
 PER_METER = 1e3  # mm per m
 MOST_EVENTS = 8  # largest number of listed events, the newest

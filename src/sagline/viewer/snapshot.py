@@ -183,11 +183,7 @@ class Snapshot:
 
 
 def snapshot_at(
-    robot: Robot,
-    pose: Pose,
-    settings: Settings,
-    previous: Plan | None,
-    wrench: Array | None = None,
+    robot: Robot, pose: Pose, settings: Settings, previous: Plan | None, wrench: Array | None = None
 ) -> Snapshot:
     """Solution at rest at a pose, for a robot to which the changes of the settings have already been applied."""
     reference = _remembered(previous, settings.tension)
