@@ -134,7 +134,7 @@ def test_undo_restores_cut_by_cut() -> None:
         for number in (1, 2):
             cuts._requested = number
             cuts._play(number, made.simulation(50), 3, (given.at(0.0).pose, player.save()))
-        first = cuts._before[-1][1].played
+        first = cuts.before[-1][1].played
         cuts.undo()
         assert player.played is first
         assert handle(server, "Undo cut").visible

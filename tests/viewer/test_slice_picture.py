@@ -15,19 +15,19 @@ SCALE, UNIT = MarginScale(25.0), ForceUnit("N", 1.0, ".1f")
 @pytest.mark.parametrize("normal", [0, 1, 2])
 def test_lines_are_at_round_margins(normal: int) -> None:
     cut = slice_of(ball, Plane(normal, 0.3), LOW, HIGH, (40, 40))
-    picture = picture_of(cut, SCALE, UNIT)
-    assert np.all(picture.boundary[..., normal] == 0.3)
-    np.testing.assert_allclose(np.linalg.norm(picture.boundary, axis=-1), RADIUS, atol=5e-3)
-    steps = PER_METER * (RADIUS - np.linalg.norm(picture.lines, axis=-1)) / SCALE.step
+    _, boundary, lines, _ = picture_of(cut, SCALE, UNIT)
+    assert np.all(boundary[..., normal] == 0.3)
+    np.testing.assert_allclose(np.linalg.norm(boundary, axis=-1), RADIUS, atol=5e-3)
+    steps = PER_METER * (RADIUS - np.linalg.norm(lines, axis=-1)) / SCALE.step
     np.testing.assert_allclose(steps, np.rint(steps), atol=0.05)
     assert set(np.rint(steps).astype(int).ravel()) == {-1, 1, 2, 3}
-    lengths = np.linalg.norm(picture.boundary[:, 1] - picture.boundary[:, 0], axis=1)
+    lengths = np.linalg.norm(boundary[:, 1] - boundary[:, 0], axis=1)
     assert lengths.max() < 0.2  # nothing joins the end of a line to the begin of the next
 
 
 def test_lines_have_their_margins_without_overlap() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (60, 60))
-    marks = picture_of(cut, SCALE, UNIT).marks
+    marks = picture_of(cut, SCALE, UNIT)[3]
     assert [text for text, _ in marks] == ["0 N", "−25 N", "25 N", "50 N", "75 N"]
     places = np.array([place for _, place in marks])
     margins = ball(places).margin
@@ -38,7 +38,7 @@ def test_lines_have_their_margins_without_overlap() -> None:
 
 def test_each_pixel_has_the_color_of_its_margin() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (30, 30))
-    image = picture_of(cut, SCALE, UNIT).image
+    image = picture_of(cut, SCALE, UNIT)[0]
     count = FINER * 29
     assert image.shape == (count, count, 4)
     x = LOW[0] + (np.arange(count) + 0.5) / count * (HIGH[0] - LOW[0])
@@ -53,15 +53,15 @@ def test_each_pixel_has_the_color_of_its_margin() -> None:
 def test_singular_poses_are_outside() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, np.array([1.9, 2.0, 2.0]), (60, 60))
     assert np.isinf(cut.margin).any()
-    picture = picture_of(cut, SCALE, UNIT)
-    assert np.isfinite(picture.boundary).all()
-    assert picture.boundary[..., 0].max() == pytest.approx(WALL, abs=0.07)  # within a cell
+    boundary = picture_of(cut, SCALE, UNIT)[1]
+    assert np.isfinite(boundary).all()
+    assert boundary[..., 0].max() == pytest.approx(WALL, abs=0.07)  # within a cell
 
 
 def test_a_slice_outside_has_no_boundary() -> None:
-    picture = picture_of(slice_of(ball, Plane(2, 1.8), LOW, HIGH, (10, 10)), SCALE, UNIT)
-    assert picture.boundary.shape == (0, 2, 3)
-    assert np.all(picture.image[..., 3] == OUTSIDE_OPACITY)
+    image, boundary, *_ = picture_of(slice_of(ball, Plane(2, 1.8), LOW, HIGH, (10, 10)), SCALE, UNIT)
+    assert boundary.shape == (0, 2, 3)
+    assert np.all(image[..., 3] == OUTSIDE_OPACITY)
 
 
 def test_bands_are_round_and_named() -> None:

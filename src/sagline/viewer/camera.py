@@ -110,11 +110,7 @@ _UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tuple[Array, Array]:
-    """The camera that is as near as possible, and sees a whole box from the usual side.
-
-    Returns:
-        Position of the camera and its target [m].
-    """
+    """Position and target [m] of the camera that is as near as possible and sees a whole box from the usual side."""
     right = np.cross(_UP, TOWARD)
     right /= np.linalg.norm(right)
     axes = np.stack((right, np.cross(TOWARD, right), -TOWARD))

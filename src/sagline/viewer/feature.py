@@ -35,10 +35,8 @@ class View:
     @property
     def state(self) -> Equilibrium | None:
         """The shown equilibrium; None during a motion, and if the pose is not feasible."""
-        snapshot = self.snapshot
-        if not isinstance(snapshot, Snapshot) or snapshot.plan is None or not snapshot.feasible:
-            return None
-        return snapshot.plan.state
+        plan = self.snapshot.plan if isinstance(self.snapshot, Snapshot) else None
+        return plan.state if plan is not None and self.snapshot.feasible else None
 
 
 class Feature:

@@ -27,7 +27,7 @@ from sagline.viewer.camera import Framing
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.missing import missing_of
 from sagline.viewer.panel import ControlPanel
-from sagline.viewer.player import Beside, Configuration, InMotion, Played, Player
+from sagline.viewer.player import Beside, InMotion, Played, Player
 from sagline.viewer.robot_scene import APART, TRACE_POINTS, RobotScene
 from sagline.viewer.server import Channel
 from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, snapshot_at
@@ -283,7 +283,8 @@ class Page:
                 self._traced = traced
                 self.scene.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
         self.panel.verdict.content, self.panel.numbers.content = _readings(view)
-        self.panel.show_sag(_largest_sag(snapshot), APART * self.size)
+        sag = 0.0 if view.state is None else float(np.max(view.state.cables.sag))
+        self.panel.show_sag(sag, APART * self.size)
         for feature in self.features:
             key = feature.depends(view)
             if feature not in self._depended or self._depended[feature] != key:
@@ -298,13 +299,6 @@ def _readings(view: View) -> tuple[str, str]:
     snapshot, scale = view.snapshot, view.scale
     if isinstance(snapshot, InMotion):
         return snapshot.verdict, snapshot.numbers(scale)
-    frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and snapshot.feasible else None
+    frequencies = None if view.state is None else modes(view.state).frequency
     compromise = None if view.missing is None else view.missing.state
     return readout.verdict(snapshot), readout.numbers_html(snapshot, scale, frequencies, compromise)
-
-
-def _largest_sag(snapshot: Configuration) -> float:
-    """Largest sag of the cables at a feasible pose [m]. 0 if the pose is not feasible, or if cables are in motion."""
-    if isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
-        return 0.0
-    return float(np.max(snapshot.plan.state.cables.sag))

@@ -17,6 +17,7 @@ from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.statics.slopes import motions_of_ends
 from sagline.statics.stiffness import stiffness
 
 FORCES: Final = 24  # trials per iteration, which divides the distance between the bounds of a limit by about 23
@@ -95,15 +96,9 @@ def push_response(state: Equilibrium, push: Push) -> PushResponse:
         raise InvalidValueError("push: cable model", "straight", "one that stretches", "Choose another cable model.")
     found = forward(state.one_robot, state.unstrained_length, state.pose, state.cables.model, push.wrench(state))
     lever = push.at - state.one_robot.center_of_mass
-    arm = np.hstack((np.eye(3), -_cross_matrix(state.pose.matrix @ lever)))
-    return PushResponse(
-        push,
-        state,
-        found.state if bool(found.solved) else None,
-        _reserve(state, push),
-        _redistributed(state, push),
-        locked(arm @ stiffness(state).compliance @ arm.T),
-    )
+    arm = motions_of_ends(state.pose.matrix @ lever)
+    loaded, compliance = found.state if bool(found.solved) else None, arm @ stiffness(state).compliance @ arm.T
+    return PushResponse(push, state, loaded, _reserve(state, push), _redistributed(state, push), locked(compliance))
 
 
 def semi_axes(compliance: Array) -> tuple[Array, Array]:
@@ -174,9 +169,3 @@ def _upper_bound(state: Equilibrium) -> float:
     if np.isfinite(robot.tension_max).all():
         return weight + float(robot.tension_max.sum())
     return BEYOND * (weight + float(np.nansum(state.limited_tension)))
-
-
-def _cross_matrix(lever: Array) -> Array:
-    """Matrix of the cross product with a vector."""
-    x, y, z = lever
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -253,8 +253,9 @@ class RobotScene:
             cell_thickness=0.6, section_thickness=1.0, fade_distance=12.0 * self._size,
         )  # fmt: skip
         self._build_axes()
-        for place, names in _neighbors(robot.frame_anchors, NEAR * self._size) if self._live else ():
-            above = place + np.array([0.0, 0.0, NEAR * self._size])
+        anchors = robot.frame_anchors
+        for names in shapes.grouped(anchors, NEAR * self._size) if self._live else ():
+            above = anchors[names].mean(axis=0) + np.array([0.0, 0.0, NEAR * self._size])
             nodes.label(f"/names/{names[0]}", ", ".join(map(str, names)), above)
 
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
@@ -323,15 +324,3 @@ def cable_colors(drawn: Configuration, scale: TensionScale) -> Colors:
     """Colors of both ends of every segment in the form for viser, shape (m (P - 1), 2, 3)."""
     ends = 2 * (shapes.points_per_cable(drawn.robot) - 1)
     return np.repeat(scale.linear_colors(drawn.tension), ends, axis=0).reshape(-1, 2, 3)
-
-
-def _neighbors(points: Array, near: float) -> list[tuple[Array, list[int]]]:
-    """Groups of points (m, 3) with distances of about `near`: middle and members of each group."""
-    groups: list[list[int]] = []
-    for i, point in enumerate(points):
-        home = next((group for group in groups if np.linalg.norm(points[group[0]] - point) < near), None)
-        if home is None:
-            groups.append([i])
-        else:
-            home.append(i)
-    return [(points[group].mean(axis=0), group) for group in groups]

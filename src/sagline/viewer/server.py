@@ -240,6 +240,16 @@ def chosen_by(topic: str, value: str | int) -> str:
     return f'data-send="{topic}" data-value="{escape(str(value))}"'
 
 
+def typed(field: Any, longest: int = 40) -> str:
+    """Text of a field without superfluous spaces, up to `longest` characters."""
+    return " ".join(str(field.value).split())[:longest]
+
+
+def toggle(field: Any, value: Any) -> None:
+    """Write a clicked value into a field; a second click empties the field."""
+    field.value = "" if str(value) == typed(field) else str(value)
+
+
 def finite_numbers(value: Any, count: int, largest: float) -> Array | None:
     """Exactly `count` numbers of magnitudes up to `largest`, from the unchecked list of a message; None for others."""
     if not isinstance(value, list) or len(value) != count:

@@ -99,21 +99,9 @@ class PlayedLog(Played):
         feasible = state not in WRONG
         text = definitions((name, escape(text)) for name, text in rows)
         verdict = verdict_box("quiet" if feasible else "bad", state.name, text)
-        return InMotion(
-            self.robot,
-            self.pose_at(k),
-            k,
-            tension,
-            np.asarray(self.length[k]),
-            verdict,
-            heads,
-            columns,
-            NO_CHOICE,
-            feasible,
-            rest,
-            truth,
-            notice="" if feasible else state.name,
-        )
+        here, length, notice = self.pose_at(k), np.asarray(self.length[k]), "" if feasible else state.name
+        table = (heads, columns, NO_CHOICE)
+        return InMotion(self.robot, here, k, tension, length, verdict, *table, feasible, rest, truth, notice=notice)
 
     def code(self, source: str, time: float) -> list[str]:
         """Lines of Python for a cycle; `source` is an expression for the execution."""

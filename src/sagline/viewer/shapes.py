@@ -31,11 +31,8 @@ def points_per_cable(robot: Robot) -> int:
 
 
 def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
-    """Points of the cables from their frame anchors over their pulleys to their exit points [m].
-
-    Returns:
-        Shape (m, WRAP_POINTS, 3); (m, 1, 3), the frame anchors, if no cable has a pulley.
-    """
+    """Points of the cables from frame anchors over pulleys to exit points [m], (m, WRAP_POINTS, 3)."""
+    # shape (m, 1, 3), the frame anchors, if no cable has a pulley
     if not pulleys_of(robot).radius.any():
         return robot.frame_anchors[:, None]
     angle = np.nan_to_num(touching_angle(robot, pose)) if wrap_angle is None else wrap_angle
@@ -49,12 +46,9 @@ def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
 
 
 def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
-    """Dead lengths as vertical lines below the frame anchors; only their lengths and rises are known, not their paths.
-
-    Returns:
-        Frame anchors, and the points below them at the distance of the rises [m], shape (m, 2, 3). True for each dead
-        length that is vertical, because its length is equal to its rise, shape (m,).
-    """
+    """Dead lengths as vertical lines below the frame anchors; their paths are not known, only lengths and rises."""
+    # returns frame anchors, and the points below them at the distance of the rises [m], shape (m, 2, 3); and True for
+    # each dead length that is vertical, because its length is equal to its rise, shape (m,)
     winches = robot.winches
     low = robot.frame_anchors.copy()
     if winches is None:
@@ -65,10 +59,8 @@ def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def drum_axes(robot: Robot) -> Array:
-    """Ends of the axes of the drums with known radii [m], shape (k, 2, 3).
-
-    A drum touches the lower end of its dead length on the side away from the robot's middle; its axis is horizontal.
-    """
+    """Ends of the axes of the drums with known radii [m], shape (k, 2, 3)."""
+    # a drum touches the lower end of its dead length on the side away from the robot's middle; its axis is horizontal
     winches = robot.winches
     if winches is None or winches.drum_radius is None:
         return np.empty((0, 2, 3))
@@ -102,10 +94,8 @@ def catenaries(ends: Array, cables: CableState, sag_scale: float) -> Array:
 
 
 def courses(robot: Robot, pose: Pose, state: Equilibrium | None, sag_scale: float) -> Array:
-    """Points of the cables from frame anchor over pulley to platform end [m], shape (m, points_per_cable, 3).
-
-    In an equilibrium the free cables are catenaries with their sag scaled by a factor; otherwise they are straight.
-    """
+    """Points of the cables from frame anchor over pulley to platform end [m], shape (m, points_per_cable, 3)."""
+    # in an equilibrium the free cables are catenaries with their sag scaled by a factor; otherwise they are straight
     contact = None if state is None else state.contact
     wrapped = wraps(robot, pose, None if contact is None else contact.wrap_angle)
     ends = chords(robot, pose, wrapped[:, -1])
@@ -165,6 +155,18 @@ def frame_solid(robot: Robot) -> Solid:
     thick = _BEAM * size_of(robot)
     dash = _DASH * size_of(robot) if is_frame_assumed(robot) else np.inf
     return _merged([beam for a, b in edges for beam in _beams(corners[a], corners[b], thick, dash)])
+
+
+def grouped(points: Array, near: float) -> list[list[int]]:
+    """Groups of the indices of points (m, d) that are closer than `near` to the first point of their group."""
+    groups: list[list[int]] = []
+    for i, point in enumerate(points):
+        home = next((group for group in groups if np.linalg.norm(points[group[0]] - point) < near), None)
+        if home is None:
+            groups.append([i])
+        else:
+            home.append(i)
+    return groups
 
 
 def is_frame_assumed(robot: Robot) -> bool:

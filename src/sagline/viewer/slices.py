@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from math import floor, log10
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, Indices
-from sagline.viewer.readout import css_color, html_block
+from sagline.viewer.readout import color_key, html_block
 from sagline.viewer.tension_scale import Colors, ForceUnit
 from sagline.workspaces.levels import Slice
 
@@ -56,11 +56,7 @@ class MarginScale:
         edges = [_bare(edge, unit) for edge in self.edges]
         between = [f"{low} to {high}" for low, high in pairwise(edges)]
         names = [f"below {edges[0]}", *between, f"above {edges[-1]}"]
-        marks = "".join(
-            f'<span class="key"><span class="swatch" style="background:{css_color(color)}"></span> {name}</span>'
-            for color, name in zip(_COLORS, names, strict=True)
-        )
-        return html_block(f"<b>Margin [{unit.name}]</b> &nbsp;{marks}")
+        return html_block(f"<b>Margin [{unit.name}]</b> &nbsp;{color_key(zip(_COLORS, names, strict=True))}")
 
 
 def _bare(edge: float, unit: ForceUnit) -> str:
@@ -73,17 +69,16 @@ FINER = 3  # pixels per point of the grid, along each axis
 INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # out of 255, so that the robot behind the slice is visible
 
 
-class Picture(NamedTuple):
-    """Drawing of a slice."""
-
-    image: NDArray[np.uint8]  # red, green, blue and opacity, with the lowest row first, shape (h, w, 4)
-    boundary: Array  # segments of the line where the margin is 0, in the world [m], shape (b, 2, 3)
-    lines: Array  # segments at the borders of the other bands, shape (s, 2, 3)
-    marks: list[tuple[str, Array]]  # labels and their positions [m], shape (3,)
+Marks: TypeAlias = list[tuple[str, Array]]  # labels and their positions [m], shape (3,)
 
 
-def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
-    """Colors and lines of a slice, each line with its margin."""
+def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> tuple[NDArray[np.uint8], Array, Array, Marks]:
+    """Drawing of a slice.
+
+    Returns:
+        Red, green, blue and opacity, with the lowest row first, shape (h, w, 4); segments of the line where the margin
+        is 0, in the world [m], shape (b, 2, 3); segments at the borders of the other bands, shape (s, 2, 3); labels.
+    """
     margin = np.clip(
         cut.margin, scale.edges[0] - scale.step, scale.edges[-1] + scale.step
     )  # infinite margins have contours
@@ -94,13 +89,13 @@ def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
     boundary = next(own for edge, own in lines if edge == 0.0)
     others = np.concatenate([own for edge, own in lines if edge != 0.0])
     marks = _marks(sorted(lines, key=lambda line: abs(line[0])), cut, unit)
-    return Picture(np.dstack((scale.colors(fine), opacity)), boundary, others, marks)
+    return np.dstack((scale.colors(fine), opacity)), boundary, others, marks
 
 
-def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[tuple[str, Array]]:
+def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> Marks:
     """Labels of the lines, beginning with 0; each is at the farthest point of its line in a direction of its own."""
     apart = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
-    marks: list[tuple[str, Array]] = []
+    marks: Marks = []
     for k, (edge, segments) in enumerate(lines):
         middles = segments.mean(axis=1)
         taken = [np.linalg.norm(middles - place, axis=1) < apart for _, place in marks]

@@ -57,37 +57,20 @@ _TINY = 1e-300
 
 
 class CableComponents(NamedTuple):
-    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first.
+    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first."""
 
-    Attributes:
-        square: Squared angular frequencies [1/s^2], shape (T,).
-        cable: Cable index of each mode, shape (T,).
-        participation: Participation factors P: modal force per acceleration of the platform end, world axes, shape (T,
-            3) [sqrt(kg)].
-        still: M_0, mass of every cable for quasi-static motion of its platform end, world axes, shape (m, 3, 3) [kg].
-        plane: The modes in the cables' planes, grouped by cable.
-        normal: The modes normal to the planes.
-        mesh: Nodes of the modes.
-    """
-
-    square: Array
-    cable: Indices
-    participation: Array
-    still: Array
-    plane: PlaneModes
-    normal: PlaneModes
-    mesh: StringMesh
+    square: Array  # squared angular frequencies [1/s^2], shape (T,)
+    cable: Indices  # cable index of each mode, shape (T,)
+    participation: Array  # modal force per acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)]
+    still: Array  # M_0, mass of every cable for quasi-static motion of its end, world axes, shape (m, 3, 3) [kg]
+    plane: PlaneModes  # modes in the cables' planes, grouped by cable
+    normal: PlaneModes  # modes normal to the planes
+    mesh: StringMesh  # nodes of the modes
 
     def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[PlaneModes, Array, Array], ...]:
-        """In-plane modes and normal modes, each with the part of K motions that belongs to it.
-
-        Args:
-            ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
-            amplitudes: Amplitudes of the components, shape (T, K).
-
-        Returns:
-            For both: modes; displacements of platform ends along their directions, (t, d, K); amplitudes, (t, k, K).
-        """
+        """In-plane modes and normal modes, each with the part of K motions that belongs to it."""
+        # shapes: ends (m, 3, K), world axes; amplitudes (T, K). returns for both: modes; displacements of the platform
+        # ends along their directions (t, d, K); amplitudes (t, k, K)
         own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
         swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])
         sway = amplitudes[inside:].reshape(*self.normal.square.shape, ends.shape[2])
@@ -95,21 +78,13 @@ class CableComponents(NamedTuple):
 
 
 class StringMesh(NamedTuple):
-    """Nodes of the taut cables.
+    """Nodes of the taut cables."""
 
-    Attributes:
-        taut: Indices of the cables, t of them.
-        table: Rows of these cables in the table of strings, shape (t, STRING_COLUMNS).
-        axes: Axes of the cables: horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3).
-        omega: Highest angular frequency for which the nodes are dense enough [rad/s].
-        points: Material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6).
-    """
-
-    taut: Indices
-    table: Array
-    axes: Array
-    omega: float
-    points: Array
+    taut: Indices  # indices of the cables, t of them
+    table: Array  # rows of these cables in the table of strings, shape (t, STRING_COLUMNS)
+    axes: Array  # horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3)
+    omega: float  # highest angular frequency for which the nodes are dense enough [rad/s]
+    points: Array  # material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6)
 
     @property
     def density(self) -> Array:
@@ -118,11 +93,9 @@ class StringMesh(NamedTuple):
 
 
 class PlaneModes(NamedTuple):
-    """Modes of the taut cables, either in the plane or normal to the plane, k modes per cable.
+    """Modes of the taut cables, either in the plane or normal to the plane, k modes per cable."""
 
-    The u unknowns of a cable are displacements times the root of the node's mass.
-    """
-
+    # the u unknowns of a cable are displacements times the root of the node's mass
     rest: Array  # quasi-static shape of the nodes for a displaced platform end, shape (t, u, d)
     square: Array  # angular frequencies squared, ascending [1/s^2], shape (t, k)
     shape: Array  # mode shapes at the nodes, shape (t, u, k)
@@ -168,10 +141,8 @@ def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
 
 
 def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
-    """Mass matrices of all cables in world axes, (m, 3, 3), zero for slack cables.
-
-    mass: elements xx, xz, zz, yy of each taut cable's mass matrix, in the axes of the cable.
-    """
+    """Mass matrices of all cables in world axes, (m, 3, 3), zero for slack cables."""
+    # mass: elements xx, xz, zz, yy of each taut cable's mass matrix, in the axes of the cable
     own = np.zeros((taut.size, 3, 3))
     own[:, 0, 0], own[:, 0, 2], own[:, 2, 0], own[:, 2, 2], own[:, 1, 1] = mass[:, [0, 1, 1, 2, 3]].T
     still = np.zeros((count, 3, 3))

@@ -157,7 +157,8 @@ def _by_weight(hung: _CatenaryState) -> Array:
         -h / size**3 * (1.0 - 3.0 * (v / size) ** 2),
         3.0 * drop * (h / size) ** 2,
     )
-    return _chosen(hung, -np.einsum("...p,...pab->...ab", below * hung.length[..., None] * _SHARES, even), steep)
+    even = -np.einsum("...p,...pab->...ab", below * hung.length[..., None] * _SHARES, even)
+    return np.asarray(np.where(hung.smooth[..., None, None], even, steep))
 
 
 def _outer(hung: _CatenaryState) -> Array:
@@ -169,7 +170,8 @@ def _outer(hung: _CatenaryState) -> Array:
     steep = _plane_of(level, none, mixed, length - level)
     size, h, v, _ = _points(hung)
     even = _plane_of((h / size) ** 2, np.zeros_like(v), h * v / size**2, (v / size) ** 2)
-    return _chosen(hung, np.einsum("...p,...pab->...ab", length[..., None] * _SHARES, even), steep)
+    even = np.einsum("...p,...pab->...ab", length[..., None] * _SHARES, even)
+    return np.asarray(np.where(hung.smooth[..., None, None], even, steep))
 
 
 def _points(hung: _CatenaryState) -> tuple[Array, Array, Array, Array]:
@@ -178,10 +180,6 @@ def _points(hung: _CatenaryState) -> tuple[Array, Array, Array, Array]:
     v = hung.b[..., None] - hung.weight[..., None] * below
     h = np.broadcast_to(hung.h[..., None], v.shape)
     return np.hypot(h, v), h, v, below
-
-
-def _chosen(hung: _CatenaryState, even: Array, steep: Array) -> Array:
-    return np.where(hung.smooth[..., None, None], even, steep)
 
 
 def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:

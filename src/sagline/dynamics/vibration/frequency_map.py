@@ -16,7 +16,6 @@ from sagline.core.table import Columns, Tabular
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model
 from sagline.dynamics.vibration.response import Receptance, coupled_receptance, modal_receptance, peak_receptance
 from sagline.dynamics.vibration.robot_modes import (
-    StateModes,
     VibrationModel,
     cable_shares,
     damping_ratios,
@@ -175,14 +174,10 @@ def _numbers_of_pose(
     if damping.loss_time > 0.0 or damping.air_damping > 0.0:
         slopes = cable_slopes(state[row])
         receptance = coupled_receptance(Receptance(model.at(row), slopes.matrix, slopes.blocks, damping), up_to)
-    peak, at = peak_receptance(receptance, found.frequency, _ratios(state, model, row, found, damping), damping)
-    return float(found.frequency[0]), lowest, float(first @ model.mass[row] @ first), peak, at
-
-
-def _ratios(state: Equilibrium, model: VibrationModel, row: int, found: StateModes, damping: Damping) -> Array:
     shares = cable_shares(model, row, found) if damping.air_damping > 0.0 else np.zeros((0, found.number))
-    density = state.one_robot.cables.linear_density[: len(shares)]
-    return damping_ratios(density, found, shares, damping)
+    ratios = damping_ratios(state.one_robot.cables.linear_density[: len(shares)], found, shares, damping)
+    peak, at = peak_receptance(receptance, found.frequency, ratios, damping)
+    return float(found.frequency[0]), lowest, float(first @ model.mass[row] @ first), peak, at
 
 
 def _at_pose(index: int, error: SaglineError) -> SaglineError:

@@ -148,13 +148,9 @@ def _massless(rest: StateSlopes, flexible: Flexibility, motion: Array, square: f
     ends = motion[:3].T + np.cross(motion[3:].T, rest.slopes.levers[:, None])
     force = ends @ np.swapaxes(rest.slopes.blocks, -1, -2)
     data = np.stack((flexible.by_length, flexible.by_density, flexible.by_stiffness))
-    return ModeGroup(
-        motion,
-        square,
-        force,
-        np.einsum("mai,mbj,mijc->mabc", force, force, flexible.by_force, optimize=True),
-        np.einsum("mai,mbj,pmij->pmab", force, force, data, optimize=True),
-    )
+    by_force = np.einsum("mai,mbj,mijc->mabc", force, force, flexible.by_force, optimize=True)
+    by_datum = np.einsum("mai,mbj,pmij->pmab", force, force, data, optimize=True)
+    return ModeGroup(motion, square, force, by_force, by_datum)
 
 
 def _result(

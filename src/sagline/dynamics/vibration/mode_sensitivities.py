@@ -40,14 +40,9 @@ class ModeGroup(NamedTuple):
 def state_slopes(state: Equilibrium) -> StateSlopes:
     """Compute force derivatives, compliance and mass of a state."""
     slopes, known = cable_slopes(state), stiffness(state)
-    return StateSlopes(
-        state,
-        slopes,
-        np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness)),
-        np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity)),
-        known.compliance,
-        mass_matrix(state),
-    )
+    by_datum = np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness))
+    settling = np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity))
+    return StateSlopes(state, slopes, by_datum, settling, known.compliance, mass_matrix(state))
 
 
 def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> dict[str, Array]:
@@ -86,7 +81,8 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
         _lever_form(swings.motion[3:], moved, slopes.force) + _lever_form(swings.motion[3:], slopes.levers, forces)
     ).sum(axis=1)
     inertia = rest.mass[3:, 3:]
-    for k, cross in enumerate(_cross_matrices()):
+    # matrices of the cross product of each axis with a vector
+    for k, cross in enumerate(np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), -1, -2)):
         form[3 + k] -= swings.square * turns.T @ (cross @ inertia - inertia @ cross) @ turns
     freedom = rest.state.one_robot.freedom
     kept: Array = np.einsum("kj,jab->kab", freedom.T @ freedom, form)
@@ -101,11 +97,6 @@ def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
     pressed = np.sum(levers * force, axis=-1)[..., None, None] * (turns.T @ turns)
     form: Array = 0.5 * (mixed + np.swapaxes(mixed, -1, -2)) - pressed
     return form
-
-
-def _cross_matrices() -> Array:
-    """Matrices (3, 3, 3) of the cross product of each axis with a vector."""
-    return np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), -1, -2)
 
 
 PHASE = 0.45 * np.pi  # largest phase of a transverse wave in an element [rad]

@@ -68,13 +68,8 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
     slopes = cable_slopes(state)
     matrix = slopes.matrix.reshape(-1, 6, 6)
     levers = slopes.levers.reshape(len(matrix), -1, 3)
-    return VibrationModel(
-        strings_of(state),
-        motions_of_ends(levers),
-        0.5 * (matrix + np.swapaxes(matrix, -1, -2)),
-        mass_matrix(state).reshape(-1, 6, 6),
-        first_of(state.robot).freedom,
-    )
+    stiffness, mass = 0.5 * (matrix + np.swapaxes(matrix, -1, -2)), mass_matrix(state).reshape(-1, 6, 6)
+    return VibrationModel(strings_of(state), motions_of_ends(levers), stiffness, mass, first_of(state.robot).freedom)
 
 
 def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
@@ -149,11 +144,8 @@ def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
     check_counts(counts, given)
     moving = np.zeros((model.strings.taut.shape[1], 3, 3))
     moving[taut] = in_world(found[0], model.strings.axes[row, taut])[0].real
-    return int(counts.sum()) + _negatives(dynamic_matrix(model, row, moving, 2.0 * np.pi * frequency))
-
-
-def _negatives(matrix: Array) -> int:
-    return int((np.linalg.eigvalsh(matrix) < 0.0).sum())
+    matrix = dynamic_matrix(model, row, moving, 2.0 * np.pi * frequency)
+    return int(counts.sum()) + int((np.linalg.eigvalsh(matrix) < 0.0).sum())
 
 
 MOST_MODES: Final = 2_000

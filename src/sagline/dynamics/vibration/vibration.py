@@ -296,17 +296,10 @@ def listed_modes(vibration: Vibration) -> list[ListedMode]:
     share = vibration.cable_share
     # the first one if several cables are equal except for rounding
     most = np.argmax(share >= (1.0 - EQUAL) * share.max(axis=0), axis=0) if vibration.frequency.size else ()
+    rows = zip(vibration.frequency, vibration.platform_share, most, vibration.loss, strict=True)
     swinging = [
-        ListedMode(
-            k + 1,
-            WITH_MASS,
-            float(vibration.frequency[k]),
-            float(vibration.platform_share[k]),
-            int(cable),
-            float(vibration.cable_share[cable, k]),
-            float(vibration.loss[k]),
-        )
-        for k, cable in enumerate(most)
+        ListedMode(k + 1, WITH_MASS, float(frequency), float(own), int(cable), float(share[cable, k]), float(loss))
+        for k, (frequency, own, cable, loss) in enumerate(rows)
     ]
     damping, platform = vibration.damping, modes(vibration.state)
     losses = damping.modal_damping + stretch_losses(vibration.state, platform, damping.loss_time)

@@ -21,10 +21,11 @@ from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import color_key, html_block, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
-from sagline.viewer.server import chosen_by
+from sagline.viewer.server import chosen_by, toggle, typed
 from sagline.viewer.shapes import Ellipsoids, ball, readable
 
 FIELD: Final = "Row of the log"
+LONGEST: Final = 20  # largest number of characters of a requested row
 TOPIC: Final = "row"  # topic of the messages with the number of a clicked row
 LARGEST: Final = 100.0  # largest factor, relative to the initial one
 OPACITY: Final = 0.55
@@ -156,7 +157,7 @@ class CalibrationFeature(Feature):
         factor = readable(self._anchors("frame_anchors", relative=False).radius, LARGE * self._size)
         self._largest = LARGEST * factor
         self._build_tab(page, factor)
-        page.channel.on(TOPIC, lambda row, _: self._toggle(row))
+        page.channel.on(TOPIC, lambda row, _: toggle(self._field, row))
         outliers = np.isin(found.rows, [one.row for one in found.outliers]) | (self._bands == self._bands.max())
         some = np.arange(0, len(found.rows), -(-len(found.rows) // MOST_POSES))
         self._drawn = np.union1d(some, np.flatnonzero(outliers)[:MOST_POSES])
@@ -203,18 +204,9 @@ class CalibrationFeature(Feature):
         if bool(self._poses_wanted.value) != self._poses:
             self._poses = bool(self._poses_wanted.value)
             self._draw_poses()
-        if self._typed != self._row:
-            self._row = self._typed
-            self._follow_row(self._row)
-
-    @property
-    def _typed(self) -> str:
-        """The requested row as typed; "" if none is requested."""
-        return " ".join(str(self._field.value).split())[:20]
-
-    def _toggle(self, row: Any) -> None:
-        """Select a clicked row; a second click removes the selection."""
-        self._field.value = "" if str(row) == self._typed else str(row)
+        if (row := typed(self._field, LONGEST)) != self._row:
+            self._row = row
+            self._follow_row(row)
 
     def _anchors(self, which: summary.Anchors, *, relative: bool) -> Ellipsoids:
         """Ellipsoids of the anchors `which`, of frame or platform; none if these anchors were not calibrated."""
@@ -225,14 +217,6 @@ class CalibrationFeature(Feature):
         if relative:
             covariance = summary.relative_covariance(points, covariance, which)
         return Ellipsoids.of(points, np.einsum("kikj->kij", covariance))
-
-    def _displacement(self, which: summary.Anchors, *, relative: bool) -> Array:
-        """Change of the anchors `which` by the calibration [m], shape (m, 3)."""
-        points = getattr(self._found.robot, which)
-        moved = points - getattr(self._found.before, which)
-        if relative:
-            moved = (summary.without_motion(points, which) @ moved.reshape(-1)).reshape(-1, 3)
-        return np.asarray(moved)
 
     def _follow_ellipsoids(self) -> None:
         wanted = (bool(self._relative.value), self._checked_factor()) if self._wanted.value else None
@@ -246,9 +230,7 @@ class CalibrationFeature(Feature):
             return
         relative, factor = wanted
         for which, parent in NODES.items():
-            self._draw_ellipsoids(
-                parent, self._anchors(which, relative=relative), self._displacement(which, relative=relative), factor
-            )
+            self._draw_ellipsoids(which, parent, factor, relative=relative)
         self._ellipsoids_html.content = _ellipsoids_text(factor, relative=relative)
 
     def _checked_factor(self) -> float:
@@ -258,10 +240,15 @@ class CalibrationFeature(Feature):
             raise InvalidValueError("Drawn ×", value, f"1 to {self._largest:g}", "Type a factor.")
         return value
 
-    def _draw_ellipsoids(self, parent: str, some: Ellipsoids, moved: Array, factor: float) -> None:
-        """Draw ellipsoids, with lines from the points before the calibration."""
+    def _draw_ellipsoids(self, which: summary.Anchors, parent: str, factor: float, *, relative: bool) -> None:
+        """Draw the ellipsoids of the anchors `which`, with lines from the points before the calibration."""
+        some = self._anchors(which, relative=relative)
         if not len(some.which):
             return
+        points = getattr(self._found.robot, which)
+        moved = points - getattr(self._found.before, which)
+        if relative:
+            moved = (summary.without_motion(points, which) @ moved.reshape(-1)).reshape(-1, 3)
         ends = np.stack((some.middle - factor * moved[some.which], some.middle), axis=1)
         self._draw_balls(f"{parent}/errors", some.middle, some.turn, some.drawn(factor), TRUTH, opacity=OPACITY)
         self._nodes.lines(f"{parent}/moves", ends, TRUTH, TRACE_WIDTH)

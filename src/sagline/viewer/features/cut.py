@@ -89,7 +89,7 @@ class CutFeature(Feature):
         self._is_marked = False  # True if a cable is marked in the scene
         self._requested = self._playing = 0  # numbers of the last requested cut and of the played cut
         self._number = 0  # of the player, for the played cut
-        self._before: tuple[Before, ...] = ()  # states of the page before each of the successive cuts
+        self.before: tuple[Before, ...] = ()  # states of the page before each of the successive cuts
         gui = page.server.gui
         with gui.add_folder("Cut a cable", expand_by_default=False, order=FIRST + 0.03):
             self._cable: Any = gui.add_dropdown("Cable to cut", tuple(map(str, range(page.robot.cable_count))))
@@ -159,24 +159,19 @@ class CutFeature(Feature):
 
     def undo(self) -> None:
         """Restore the page as it was before the last cut."""
-        if not self._before:
+        if not self.before:
             self.put(())
             return
-        pose, state = self._before[-1]
-        self.put(self._before[:-1])
+        pose, state = self.before[-1]
+        self.put(self.before[:-1])
         self._player.restore(state)
         if not state.following:
             self._page.go(pose)
 
-    @property
-    def before(self) -> tuple[Before, ...]:
-        """States of the page before each of the successive cuts."""
-        return self._before
-
     def put(self, before: tuple[Before, ...]) -> None:
         """Set the states before the cuts. The results of a simulation that is still running are ignored."""
         self._requested += 1
-        self._before, self._undo.visible, self._text.content = before, bool(before), HELP
+        self.before, self._undo.visible, self._text.content = before, bool(before), HELP
 
     @property
     def _chosen(self) -> int:
@@ -196,7 +191,7 @@ class CutFeature(Feature):
             self._player.grow(PlayedSimulation(simulation))
         else:
             self._playing, self._is_marked = number, False
-            self._before += (before,)
+            self.before += (before,)
             self._player.play(PlayedSimulation(simulation), at_once=True)
             self._number = self._player.number
             self._undo.visible = True

@@ -214,11 +214,7 @@ def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], pla
 
 
 def moments(duration: float, speed: float) -> Array:
-    """Times of a film's pictures [s], from 0 to the end, shape (n,), n >= 2.
-
-    Raises:
-        InvalidValueError: If the film would be too long.
-    """
+    """Times of a film's pictures [s], from 0 to the end, shape (n,), n >= 2; too long a film is refused."""
     length = duration / speed
     if length > LONGEST:
         step = "Choose a higher speed on the timeline; the film has the same speed."
@@ -307,11 +303,8 @@ class ExportFeature(Feature):
             exporter.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
 
     def _send_film(self, exporter: _Exporter) -> None:
-        """Make the client's page record a film of the played motion from its camera; others are not affected.
-
-        The settings of the view are used for all configurations. The server's scene is hidden from the client until the
-        film is complete.
-        """
+        """Make the client's page record a film of the played motion from its camera; others are not affected."""
+        # the settings of the view are used for all configurations; the server's scene is hidden from the client
         view, played, speed = self._page.view, self._page.player.played, self._page.player.speed
         if played is None or view is None:
             return

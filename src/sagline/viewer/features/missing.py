@@ -38,17 +38,12 @@ def explanation(
         place = ", ".join(number_text(x, ".3f") for x in nearest.pose.position)
         button = f"<button {chosen_by(GO, '')}>Go there</button>"
         level = ", the platform level" if nearest.turned else ""
-        rows.append(("Nearest feasible", f"{_distance_of(nearest)} away at {place} m{level}. {button}"))
+        rows.append(("Nearest feasible", f"{n(nearest.distance, '.3g', 'm')} away at {place} m{level}. {button}"))
     elif searching:
         rows.append(("Nearest feasible", "searching …"))
     elif snapshot.status not in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED):
         rows.append(("Nearest feasible", "none within the robot, at this orientation or level"))
     return html_block(definitions(rows, "missing"))
-
-
-def _distance_of(nearest: NearestFeasible) -> str:
-    """Distance to the nearest feasible pose."""
-    return n(nearest.distance, ".3g", "m")
 
 
 def missing_label(missing: MissingWrench, unit: ForceUnit) -> str:
@@ -174,7 +169,7 @@ class MissingFeature(Feature):
             nodes.hide("/nearest", "/nearest_way")
             return
         nodes.body("/nearest", self._body, FEASIBLE, 0.5, nearest.pose)
-        text = f"feasible here, {_distance_of(nearest)} away"
+        text = f"feasible here, {n(nearest.distance, '.3g', 'm')} away"
         nodes.label("/nearest/name", text, (0.0, 0.0, 0.0), "top-center", SMALL)
         ends = np.stack((snapshot.pose.position, nearest.pose.position))[None]
         nodes.lines("/nearest_way", shapes.segments(shapes.straight(ends), dashed=True), FEASIBLE, LINE_WIDTH)

@@ -24,9 +24,8 @@ from sagline.dynamics.vibration.vibration import (
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block, refused, sentence
-from sagline.viewer.server import chosen_by
+from sagline.viewer.server import chosen_by, toggle, typed
 from sagline.viewer.swing import PERIOD, Swing, mode_of
 from sagline.viewer.tension_scale import number_text
 
@@ -171,7 +170,7 @@ class ModesFeature(Feature):
             self._force: Any = gui.add_dropdown("Force", MOTIONS, hint="Along an axis, or a moment about one.")
             self._figure = gui.add_html("")
         page.refresh_on(self._mode, self._up_to, self._force)
-        page.channel.on(TOPIC, lambda name, _: self._toggle(name))
+        page.channel.on(TOPIC, lambda name, _: toggle(self._mode, name))
 
     @property
     def moving(self) -> bool:
@@ -209,11 +208,6 @@ class ModesFeature(Feature):
             self._scene.swing(self.swing.state.pose, self.swing.pose(phase), self.swing.courses(phase))
 
     @property
-    def _chosen(self) -> str:
-        """Name of the chosen mode; "" if none is chosen."""
-        return " ".join(str(self._mode.value).split())[:40]
-
-    @property
     def _highest(self) -> float:
         """Highest frequency of the list [Hz]."""
         value = float(self._up_to.value)
@@ -224,10 +218,6 @@ class ModesFeature(Feature):
         """Axis of the force of the response, one of `MOTIONS`."""
         return self._force.value if self._force.value in MOTIONS else MOTIONS[0]
 
-    def _toggle(self, name: Any) -> None:
-        """Select a clicked mode; a second click removes the selection."""
-        self._mode.value = "" if str(name) == self._chosen else str(name)
-
     def _refuse(self, message: str) -> None:
         self._vibration, self._listed = None, ()
         self._text.content = self._figure.content = ""
@@ -235,11 +225,11 @@ class ModesFeature(Feature):
 
     def _at_rest(self, view: View) -> tuple[Equilibrium | None, Hashable]:
         """The equilibrium of the modes, and a key of it."""
-        snapshot, settings = view.snapshot, view.settings
-        if view.playing or isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
+        state, pose, settings = view.state, view.snapshot.pose, view.settings
+        if view.playing or state is None:
             return None, None
-        place = snapshot.pose.position.tobytes() + snapshot.pose.quaternion.tobytes()
-        return snapshot.plan.state, (place, settings.changes, settings.model, settings.tension, id(view.played))
+        place = pose.position.tobytes() + pose.quaternion.tobytes()
+        return state, (place, settings.changes, settings.model, settings.tension, id(view.played))
 
     def _receive(self, vibration: Vibration) -> None:
         if vibration.state is self._state:
@@ -261,14 +251,15 @@ class ModesFeature(Feature):
 
     def _choose(self, vibration: Vibration) -> None:
         """Animate the chosen mode, and write list and response."""
-        mode = mode_of(vibration, self._chosen)
+        chosen = typed(self._mode)
+        mode = mode_of(vibration, chosen)
         if mode is None:
             self._stop_swing()
         elif self.swing is None or self.swing.mode != mode or self.swing.state is not vibration.state:
             self.swing = Swing.of(vibration, mode)
         curves = self._response(vibration)
         name = "" if self.swing is None else self.swing.mode.name
-        self._text.content = _swing_text(vibration, self.swing, self._chosen)
+        self._text.content = _swing_text(vibration, self.swing, chosen)
         if self._listed != (vibration, curves, name):
             self._listed = (vibration, curves, name)
             modes = listed_modes(vibration)

@@ -234,22 +234,14 @@ class ProofFeature(Feature):
 
     def follow(self, view: View) -> None:
         """Write the force balance and draw its forces."""
-        state, missing = self._balance(view)
+        state, missing = view.state, None
+        if state is None and view.missing is not None:
+            state, missing = view.missing.state, view.missing.wrench
         if state is None:
             self._html.content = sentence(NOT_AT_REST if not isinstance(view.snapshot, Snapshot) else UNKNOWN)
         else:
             self._html.content = force_polygon_figure(state, missing)
         self._draw(state if self._wanted.value else None, missing)
-
-    def _balance(self, view: View) -> tuple[Equilibrium | None, Array | None]:
-        """The equilibrium with its missing wrench."""
-        snapshot = view.snapshot
-        if not isinstance(snapshot, Snapshot):
-            return None, None
-        if snapshot.plan is not None and snapshot.feasible:
-            return snapshot.plan.state, None
-        missing = view.missing
-        return (None, None) if missing is None else (missing.state, missing.wrench)
 
     def _draw(self, state: Equilibrium | None, missing: Array | None) -> None:
         """Draw the forces as arrows at their points of application."""

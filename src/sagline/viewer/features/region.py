@@ -19,7 +19,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
-from sagline.viewer.slices import MarginScale, Picture, picture_of
+from sagline.viewer.slices import MarginScale, Marks, picture_of
 from sagline.viewer.tension_scale import force_unit
 from sagline.workspaces.levels import Levels, Plane, slice_of
 from sagline.workspaces.region import Region, region_of
@@ -277,30 +277,30 @@ class RegionFeature(Feature):
         if self._slice_key != (self._key, plane):
             self._slice_key = (self._key, plane)
             cut = slice_of(levels.details, plane, region.low, region.high, (POINTS, POINTS))
-            self._draw_slice(plane, region.low, region.high, picture_of(cut, self._scale, unit))
+            self._draw_slice(plane, region, picture_of(cut, self._scale, unit))
 
-    def _draw_slice(self, plane: Plane, low: Array, high: Array, picture: Picture) -> None:
-        nodes = self._nodes
-        first, second = plane.axes
-        middle = 0.5 * (low + high)
+    def _draw_slice(self, plane: Plane, region: Region, drawn: tuple[Any, Array, Array, Marks]) -> None:
+        nodes, (image, boundary, lines, marks) = self._nodes, drawn
+        width, height = (region.high - region.low)[list(plane.axes)].tolist()
+        middle = 0.5 * (region.low + region.high)
         middle[plane.normal] = plane.at
         nodes.draw(
             "/slice/picture",
             nodes.scene.add_image,
-            image=picture.image,
-            render_width=float(high[first] - low[first]),
-            render_height=float(high[second] - low[second]),
+            image=image,
+            render_width=width,
+            render_height=height,
             format="png",
             wxyz=_TURNS[plane.normal],
             position=middle,
             cast_shadow=False,
             receive_shadow=False,
         )
-        nodes.lines("/slice/boundary", picture.boundary, INFEASIBLE, BOUNDARY_WIDTH)
-        nodes.lines("/slice/lines", picture.lines, LINE_COLOR, LINE_WIDTH)
-        for k, mark in enumerate(picture.marks):
+        nodes.lines("/slice/boundary", boundary, INFEASIBLE, BOUNDARY_WIDTH)
+        nodes.lines("/slice/lines", lines, LINE_COLOR, LINE_WIDTH)
+        for k, mark in enumerate(marks):
             nodes.label(f"/slice/levels/{k}", *mark, "top-left", _SMALL)
-        nodes.keep_first("/slice/levels", len(picture.marks))
+        nodes.keep_first("/slice/levels", len(marks))
 
     def _follow_travel(self, levels: Levels, region: Region, robot: Robot, pose: Pose) -> None:
         if not self._travel_box.value:
@@ -308,11 +308,8 @@ class RegionFeature(Feature):
             return
         which = workspace.free_directions(robot, region.flat)
         travel = workspace.free_travel(levels.details, pose.position, which, region.low, region.high)
-        self._draw_travel(travel)
         self._travel_html.content = workspace.travel_text(travel, force_unit(robot), self._without)
-
-    def _draw_travel(self, travel: workspace.FreeTravel) -> None:
-        """Draw an arrow in each direction. An arrow that ends at the boundary has its length as text."""
+        # an arrow that ends at the boundary has its length as text
         ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
         self._nodes.arrows("/travel", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))
         for k, which in enumerate(travel.which):

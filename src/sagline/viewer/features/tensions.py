@@ -14,6 +14,7 @@ from sagline.kinematics.polygon import polygon_at, tension_polygon
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import MinimumNorm
 from sagline.tension.polygon import Side, TensionPolygon
+from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import html_block, sentence
@@ -138,17 +139,9 @@ NEAR: Final = 10.0  # closer marks are joined [px]
 
 def grouped(marks: tuple[MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[MethodMark]]]:
     """Groups of `marks` at the same position, and these positions [px]. Only methods with a result have a mark."""
-    groups: list[tuple[tuple[float, float], list[MethodMark]]] = []
-    for mark in marks:
-        if mark.missing:
-            continue
-        x, y = field.place(field.polygon.coordinates(mark.tension))
-        home = next((group for (u, v), group in groups if np.hypot(u - x, v - y) < NEAR), None)
-        if home is None:
-            groups.append(((x, y), [mark]))
-        else:
-            home.append(mark)
-    return groups
+    known = [mark for mark in marks if not mark.missing]
+    places = [field.place(field.polygon.coordinates(mark.tension)) for mark in known]
+    return [(places[group[0]], [known[k] for k in group]) for group in shapes.grouped(np.array(places), NEAR)]
 
 
 MOST_REDUNDANT: Final = 2  # largest number of redundant cables for which the feasible tensions are drawn
