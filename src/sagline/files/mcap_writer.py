@@ -189,16 +189,11 @@ class Recorder:
         epoch: int | None = None,
         stream: RawIOBase | None = None,
     ) -> None:
-        """Open the file and start the thread.
-
-        Args:
-            file: The file, for example "run.mcap". An existing regular file is replaced; any other target is refused.
-            robot: The robot used by the controller.
-            period: Period of a cycle [s].
-            group_count: Number of groups G; None: two winches per group.
-            epoch: Time of the log minus time of the link's clock [ns]. None: the log starts at the present time of day.
-            stream: Unbuffered output that is used instead of the file.
-        """
+        """Open the file and start the thread."""
+        # file: for example "run.mcap"; an existing regular file is replaced, any other target is refused. robot: the
+        # robot used by the controller. period: period of a cycle [s]. group_count: number of groups G; None: two
+        # winches per group. epoch: time of the log minus time of the link's clock [ns]; None: the log starts at the
+        # present time of day. stream: unbuffered output that is used instead of the file
         self.file = check_file(file_path(file))
         check_packages()
         self._robot, self._period = instance(robot, Robot, "robot"), period

@@ -77,12 +77,6 @@ def _lead_of(robot: Robot, pose: Pose) -> tuple[Array, Array, Array]:
     return start, side, dead_cable(robot) + radius * (first - off)
 
 
-def _free_chords(robot: Robot, pose: Pose) -> Array:
-    """Chords of straight cables from their exit points at the frame to their platform ends [m], shape (m, 3)."""
-    exits = points_on_pulleys(robot, pose, np.nan_to_num(touching_angle(robot, pose)))
-    return np.asarray(pose.transform(robot.platform_anchors) - exits)
-
-
 def _add_pulleys(world: Element, robot: Robot, pose: Pose, side: Array) -> None:
     """Add the pulleys, each as a separate fixed body."""
     radius = pulleys_of(robot).radius
@@ -186,7 +180,9 @@ def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float
     mobility = np.swapaxes(moved, 1, 2) @ np.linalg.solve(masses, moved)
     fastest = float(np.sqrt(stiffness @ np.linalg.eigvalsh(mobility)[:, -1]))
     step = min(_LONGEST_STEP, 2.0 * np.pi / (_STEPS * fastest))
-    cables = _free_chords(robot, pose)
+    # chords of straight cables from their exit points at the frame to their platform ends, (m, 3)
+    exits = points_on_pulleys(robot, pose, np.nan_to_num(touching_angle(robot, pose)))
+    cables = pose.transform(robot.platform_anchors) - exits
     distance = np.linalg.norm(cables, axis=1)
     directions = cables / np.where(distance > 0.0, distance, 1.0)[:, None]
     stretch = np.einsum("ik,ijk->ij", directions, moved)

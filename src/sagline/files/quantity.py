@@ -34,14 +34,7 @@ def plain_number(text: str) -> float | None:
     """Read a number from a decimal text: digits 0 to 9 with optional point, sign and exponent, or inf or nan.
 
     Other notations of YAML, Python or C are not accepted, for example 1:30, 0x10, 1_000 and digits of other alphabets.
-
-    Returns:
-        The number; None if the text is not a number. Only the word inf gives infinity; 1e999 gives the largest float64.
-
-    Examples:
-        >>> from sagline.files.quantity import plain_number
-        >>> plain_number(" 010.5e1 "), plain_number("1_000")
-        (105.0, None)
+    The result is None if the text is not a number. Only the word inf gives infinity; 1e999 gives the largest float64.
     """
     found = _PLAIN.fullmatch(text) if len(text) <= _LONGEST else None
     if found is None:

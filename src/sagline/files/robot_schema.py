@@ -318,11 +318,8 @@ class RobotEntry(YamlEntry):
             fields["inertia"] = self.inertia.about_center(mass)
         if self.test_box is not None:
             fields["test_box"] = PoseBox(**self.test_box.given("test_box."))
-        return self._with_tolerances(Robot(**fields))
-
-    def _with_tolerances(self, robot: Robot) -> Robot:
-        """Add the tolerances to the robot; the file may give them in percent."""
-        about: dict[str, Any] = {}
+        robot = Robot(**fields)
+        about: dict[str, Any] = {}  # tolerances may be in percent of the robot's values
         if self.tolerances is not None:
             about["tolerances"] = self.tolerances.of(robot, "tolerances.")
         if self.calibration is not None:

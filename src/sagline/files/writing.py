@@ -43,13 +43,6 @@ def file_stem(name: str, *words: str) -> str:
 
     Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
     other characters or is too long, eight digits of its digest are added, so that two robots never have the same files.
-
-    Examples:
-        >>> from sagline.files.writing import file_stem
-        >>> file_stem("hall camera", "catenary")
-        'hall-camera-catenary'
-        >>> file_stem("../../evil", "poses")
-        'evil-0fbfd372-poses'
     """
     plain = unicodedata.normalize("NFC", name)
     # categories: letters, marks, numbers

@@ -119,13 +119,7 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
 
 
 def dump_mapping(data: Mapping[str, Any]) -> str:
-    """Write a mapping as YAML that `parse_mapping` restores. Texts that look like numbers are in quotes.
-
-    Examples:
-        >>> from sagline.files.yaml_text import dump_mapping
-        >>> print(dump_mapping({"name": "1e5", "mass": 1e5}), end="")
-        {name: '1e5', mass: 100000.0}
-    """
+    """Write a mapping as YAML that `parse_mapping` restores. Texts that look like numbers are in quotes."""
     return yaml.dump(
         dict(data), Dumper=_PlainDumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120
     )

@@ -67,7 +67,7 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     create_folder(place, parents=False)
     heads = [heading(part.name, part.unit) for part in request.candidates.parts]
     heads += [heading(goal.kind, goal.unit) for goal in request.goals]
-    digest = digest_of(request)
+    digest = sha256(_canonical(request).encode()).hexdigest()
     file = place / EVALUATIONS
     _check_request(place, digest, request)
     handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
@@ -85,11 +85,6 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
         yield record
     finally:
         os.close(handle)
-
-
-def digest_of(request: Request) -> str:
-    """Digest of a request without the number of evaluations, 64 hexadecimal digits."""
-    return sha256(_canonical(request).encode()).hexdigest()
 
 
 def _canonical(value: Any) -> str:

@@ -138,12 +138,8 @@ def pareto_front(costs: Array) -> Indices:
     _, first = np.unique(costs, axis=0, return_index=True)
     kept = np.sort(first)
     own = costs[kept]
-    beaten: Flags = np.array([_beaten(one, own) for one in own])
+    beaten: Flags = np.array([((own <= one).all(axis=1) & (own < one).any(axis=1)).any() for one in own])
     return np.asarray(kept[~beaten])
-
-
-def _beaten(one: Array, others: Array) -> bool:
-    return bool(((others <= one).all(axis=1) & (others < one).any(axis=1)).any())
 
 
 LONGEST: Final = 80  # largest number of letters of a robot's name before the number

@@ -200,7 +200,8 @@ class Rating:
 
     def _rated(self, values: Array) -> Array:
         cables = self._candidates.cables(values)
-        none = impossible(cables) | self._in_platform(cables)
+        in_platform = (self._solid.holds(cables[..., : tables.FRAME_Z + 1]) >= 0).any(axis=-1)
+        none = impossible(cables) | in_platform
         measured = self._measured(cables[~none], values[~none])
         found = np.full((len(values), len(self._goals)), np.nan)
         worst = self._robust is not None and self._robust.take == "worst"
@@ -248,10 +249,6 @@ class Rating:
         ends = cables[..., tables.PLATFORM_X : tables.PLATFORM_Z + 1] @ np.swapaxes(self._poses.matrix, -1, -2)
         chords = np.linalg.norm(ends + self._poses.position[:, None] - cables[..., : tables.FRAME_Z + 1], axis=-1)
         return np.asarray(costs[:, None] * chords.max(axis=2).sum(axis=-1))
-
-    def _in_platform(self, cables: Array) -> Flags:
-        """Mask (N,) of cable tables (N, m, CABLE_COLUMNS): True if a frame anchor is inside the platform at a pose."""
-        return np.asarray((self._solid.holds(cables[..., : tables.FRAME_Z + 1]) >= 0).any(axis=-1))
 
     def _held_at(self, cables: Array) -> Flags:
         """Mask of poses at which a robot has tensions, shape (G,)."""

@@ -159,19 +159,15 @@ def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
 def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
     """Client of Dask with workers on this machine; None if this process computes the tasks one after the other."""
     if count > 1 and tasks > FEW and is_installed("distributed"):
-        _check_not_imported()
+        # end a worker whose start runs the user's script again; the parent process reports the reason
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            raise SystemExit(1)
         with local_workers(min(count, tasks), tell) as client:
             yield client
     else:
         if count > 1 and tasks > FEW:
             tell('Without Dask, tasks run one after the other. For parallel tasks, pip install "sagline[sweep]".')
         yield None
-
-
-def _check_not_imported() -> None:
-    """End a worker whose start runs the user's script again; the parent process reports the reason."""
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        raise SystemExit(1)
 
 
 HERE: Final = "127.0.0.1"  # an address that other computers cannot reach
