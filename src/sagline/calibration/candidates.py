@@ -12,7 +12,7 @@ from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.core.progress import Progress, blocks
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.pattern import ROTATING
+from sagline.robot.checks import ROTATING
 from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows

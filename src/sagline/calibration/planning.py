@@ -30,7 +30,7 @@ from sagline.core.memory import check_memory
 from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved
-from sagline.robot.pattern import ROTATING
+from sagline.robot.checks import ROTATING
 from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 

@@ -32,7 +32,7 @@ from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.status import ForwardStatus, PoseStatus
 from sagline.plc.blocks import BLOCKS, LAYOUT, Block, Field
 from sagline.robot.batch import has_routing
-from sagline.robot.pattern import ROTATING
+from sagline.robot.checks import ROTATING
 from sagline.robot.reach import LEVEL
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table

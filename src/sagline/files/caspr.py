@@ -15,7 +15,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files import robot_xml as xml
 from sagline.files.reading import exists, value_errors
-from sagline.robot.pattern import MotionPattern
+from sagline.robot.checks import MotionPattern
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 

@@ -16,7 +16,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.files import robot_xml as xml
 from sagline.files.reading import value_errors
-from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
+from sagline.robot.checks import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot, box_inertia
 from sagline.robot.winch import Winch
 

@@ -20,7 +20,7 @@ from sagline.kernels.forward.platform import ENERGY
 from sagline.kinematics.forward import checked_lengths, from_orientations, start_quaternions
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution, iterate_routing
 from sagline.kinematics.status import STABLE, ForwardStatus
-from sagline.robot.pattern import PLANAR, ROTATING
+from sagline.robot.checks import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench

@@ -23,8 +23,8 @@ from sagline.kernels.forward.platform import ENERGY
 from sagline.kinematics import forward_rows
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution, solve_forward_rows
 from sagline.robot import batch
+from sagline.robot.checks import PLANAR, ROTATING
 from sagline.robot.equilibrium import Equilibrium, cables_of_results, limited_tension
-from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot

@@ -1,6 +1,8 @@
-"""Checks of a robot's fields; each returns the value that the robot stores."""
+"""Motion patterns, which select the free motions, and checks of a robot's fields, which return the stored values."""
 
 from __future__ import annotations
+
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,8 +11,39 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import instance
 from sagline.core.arrays import SMALLEST, Array, checked, exactly, locked, refuse_first
 from sagline.core.errors import InvalidValueError
-from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import unit
+
+MotionPattern = Literal["3R3T", "3T", "1R2T", "2T"]
+MOTION_PATTERNS: Final[tuple[str, ...]] = get_args(MotionPattern)
+PLANAR: Final = frozenset({"1R2T", "2T"})
+ROTATING: Final = frozenset({"3R3T", "1R2T"})
+_SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
+
+
+def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
+    """Orthonormal rows (n, 6) that select the free components of a wrench or twist in world axes.
+
+    plane_normal: unit normal of the plane of a planar pattern, (3,). Its translations are e1 and e2 with e1 x e2 =
+    plane_normal; e1 is horizontal, and e2 points upward as steeply as the plane allows. The rotation is the last row.
+    """
+    if plane_normal is None:
+        return _SPATIAL[pattern]
+    rows = np.zeros((3, 6))
+    rows[:2, :3] = _plane_axes(plane_normal)
+    rows[2, 3:] = plane_normal
+    return locked(rows if pattern == "1R2T" else rows[:2])
+
+
+def _plane_axes(normal: Array) -> Array:
+    # the length of this vector is the sine of the angle between normal and vertical
+    horizontal = np.cross((0.0, 0.0, 1.0), normal)
+    length = float(np.linalg.norm(horizontal))
+    if length < 1e-12:  # in a horizontal plane (except for rounding) every direction is horizontal; x is chosen
+        horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+        length = float(np.linalg.norm(horizontal))
+    first = horizontal / length
+    return np.stack([first, np.cross(normal, first)])
+
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
 # tolerance for moments with three digits: the largest moment of a thin plate equals the sum of the other two

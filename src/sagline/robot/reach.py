@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.robot.pattern import ROTATING
+from sagline.robot.checks import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

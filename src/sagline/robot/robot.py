@@ -17,7 +17,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, given_by_name, given_or_none, if_known, reduced
 from sagline.core.results import Shown, set_fields
 from sagline.robot import checks
-from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
+from sagline.robot.checks import MOTION_PATTERNS, MotionPattern, freedom_matrix
 from sagline.robot.pose import PoseBox
 from sagline.robot.tolerances import UNCERTAIN, Provenance, deviations, value_of
 from sagline.robot.winch import Winch

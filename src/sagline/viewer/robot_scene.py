@@ -11,7 +11,7 @@ import viser
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
 from sagline.robot.batch import pulleys_of
-from sagline.robot.pattern import ROTATING
+from sagline.robot.checks import ROTATING
 from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
 from sagline.viewer import shapes

@@ -14,7 +14,7 @@ from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.core.results import set_fields
-from sagline.robot.pattern import PLANAR, ROTATING
+from sagline.robot.checks import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, turn_in_words
 from sagline.robot.robot import Robot

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline.kernels import statics as kernels
-from sagline.robot.pattern import freedom_matrix
+from sagline.robot.checks import freedom_matrix
 from tests.kernels.compiled import from_python
 
 NORMAL = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25)
