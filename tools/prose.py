@@ -1,7 +1,7 @@
 """Linter of the prose: `make check` reports forbidden words and openings in pages, docstrings, comments and messages.
 
 A line of output has the form `file:line: text -> suggestion`. Code, links and formulas in pages are skipped. A string
-literal is a message if it has three words or more.
+literal is a message if it has three words or more. Messages and tables in the tests are data and are skipped.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 ROOT: Final = Path(__file__).parents[1]
-PLACES: Final = ("README.md", "CONTRIBUTING.md", "docs", "src", "examples", "benchmarks", "tools", "paper")
+PLACES: Final = ("README.md", "CONTRIBUTING.md", "docs", "src", "examples", "benchmarks", "tools", "paper", "tests")
+TESTS: Final = ROOT / "tests"
 KINDS: Final = (".md", ".py", ".ipynb", ".toml")
 OPENINGS: Final = {  # first words of a docstring -> suggestion
     r"What|How|Whether|Where|Which|Who|Whose|Whatever|When|Why": "a noun phrase or an imperative verb",
@@ -133,6 +134,8 @@ def prose(file: Path) -> Iterator[Text]:
     if file.suffix == ".ipynb":
         cells = json.loads(text)["cells"]
         return page("\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown"))
+    if TESTS in file.parents:
+        return (each for each in python(text) if each.docstring or each.comment)
     return python(text) if file.suffix == ".py" else page(text)
 
 
@@ -147,10 +150,11 @@ def faults(text: Text) -> Iterator[tuple[int, str, str]]:
 
 
 def files() -> Iterator[Path]:
-    """Pages, notebooks and modules of the project, without the tests."""
+    """Pages, notebooks and modules of the project; of the tests the modules only."""
     for place in PLACES:
         found = sorted((ROOT / place).rglob("*")) if (ROOT / place).is_dir() else [ROOT / place]
-        yield from (file for file in found if file.suffix in KINDS and file != Path(__file__))
+        kinds = KINDS if place != "tests" else (".py",)
+        yield from (file for file in found if file.suffix in kinds and file != Path(__file__))
 
 
 def main() -> int:

@@ -138,7 +138,7 @@ def log_of(
     noise: float = 1.0,
     slips: Mapping[tuple[int, int], float] | None = None,
 ) -> Synthetic:
-    """What is read while the robot stands at feasible poses of its box, at each with several sets of tensions.
+    """Readings of the robot at equilibrium in feasible poses of its box, with several sets of tensions at each pose.
 
     Args:
         truth: What the robot is.
@@ -201,7 +201,7 @@ def _feasible(robot: sl.Robot, count: int, sets: int, rng: np.random.Generator) 
 def _measured(
     sensors: sl.Sensors, pose: sl.Pose, positions: int, rotations: int, noise: float, rng: np.random.Generator
 ) -> tuple[Array | None, Array | None]:
-    """What the measuring system reads, NaN in the rows where nobody measured."""
+    """Readings of the measuring system, NaN in rows without a measurement."""
     count = len(pose)
     position = rotation = None
     out = sensors.frame.matrix

@@ -57,8 +57,8 @@ class Covered(NamedTuple):
         one: Within one.
         two: Within two.
         mahalanobis: Mean square.
-        unseen: Poses with a slip that are no outlier.
-        misnamed: Outliers that tell of another cable than the one that slipped.
+        unseen: Poses with a slip that is not found as an outlier.
+        misnamed: Outliers with another cable than the slipped one.
         wrong: Outliers that are none.
         doubtful: How many did not end FOUND.
     """

@@ -1,4 +1,4 @@
-"""What every test of the controller leaves behind."""
+"""State of the process after every test of the controller."""
 
 import gc
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def _garbage_is_collected() -> Iterator[None]:
-    """A test that leaves a platform on its way leaves no other without garbage collection."""
+    """A test that ends during a motion does not leave garbage collection off for others."""
     yield
     gc.unfreeze()
     gc.enable()

@@ -19,16 +19,16 @@ from tests.dynamics.machines import prototype
 
 ROBOT = prototype(load_cell_gain=1.0, load_cell_bias=0.0)
 OWNER = 4711
-DURATION = 8.0  # s, home -> P2, and home again where a run goes on
+DURATION = 8.0  # s, home -> P2, and back for longer runs
 FRICTION = 15.0
-KEPT = 150  # cycles that are computed once
+KEPT = 150  # cycles computed once for all tests
 RADIUS, GEAR = 0.03, 20.0
 
 Change = Callable[[int, Cycle], Cycle]
 
 
 class Course(NamedTuple):
-    """Where the prototype goes, and what its cells read there of a load that is not the planned one."""
+    """Motion of the prototype, and readings of its load cells for a load that differs from the plan."""
 
     length: Array
     rate: Array
@@ -39,7 +39,7 @@ class Course(NamedTuple):
 
 @cache
 def course(more_mass: float = 0.0) -> Course:
-    """Home -> P2 and back, 100 samples a second."""
+    """Home -> P2 and back, 100 samples per second."""
     places = [HOME, TEN_POSES[1], HOME]
     plan = sl.inverse(ROBOT, sl.quintic_path(places, durations=DURATION))
     tension = read = plan.state.cables.frame_end_tension
@@ -57,7 +57,7 @@ def course(more_mass: float = 0.0) -> Course:
 def cycles(
     count: int, seed: int = 0, more_mass: float = 0.0, unsteady: bool = False, delay: int = 0
 ) -> Iterator[Cycle]:
-    """A good machine: cells with 1 N of noise and up to 2 N of bias, friction, and a link of a cycle's delay.
+    """A faultless machine: cells with 1 N of noise and up to 2 N of bias, friction, and a delay of one cycle.
 
     Args:
         count: How many cycles.
@@ -93,7 +93,7 @@ def _command(counter: int, length: Array, rate: Array, tension: Array) -> Comman
 
 
 def _sample(way: Course, k: int, taken: int, bias: Array, rng: np.random.Generator) -> Sample:
-    """What a good machine says in cycle k that has taken so many commands."""
+    """Sample of a faultless machine in cycle k after a number of accepted commands."""
     at = taken % len(way.length)
     true = way.read[at]
     rubs = FRICTION * rng.uniform(-1.0, 1.0, 8)
@@ -121,7 +121,7 @@ def _sample(way: Course, k: int, taken: int, bias: Array, rng: np.random.Generat
 
 
 def _without(sample: Sample, before: Sample, lost: Flags, age: Array) -> Sample:
-    """The newest blocks of some groups are those of before."""
+    """The blocks of some groups are repeated from the previous cycle."""
     both = np.repeat(lost, 2)
     old = {
         name: np.where(both if value.size == 8 else lost, getattr(before, name), value)
@@ -144,7 +144,7 @@ def one(array: Any, index: int, value: float) -> Any:
 
 
 class Told(NamedTuple):
-    """A fault that began."""
+    """The beginning of a fault."""
 
     cycle: int
     name: str
@@ -153,7 +153,7 @@ class Told(NamedTuple):
 
 @cache
 def _first_cycles(**options: Any) -> tuple[Cycle, ...]:
-    """Cycles of a good machine, which several tests begin with; none can change them."""
+    """Read-only cycles of a faultless machine for the beginning of several tests."""
     found = tuple(cycles(KEPT, **options))
     for cycle in found:
         for value in (*cycle.sample, *(cycle.command or ()), cycle.tension, cycle.correction):
@@ -163,7 +163,7 @@ def _first_cycles(**options: Any) -> tuple[Cycle, ...]:
 
 
 def told(change: Change | None, count: int = 300, robot: sl.Robot = ROBOT, **options: Any) -> list[Told]:
-    """What a fresh set of rules tells of a run."""
+    """Faults that a new set of rules reports for a run."""
     rules = faults_of(robot)
     found, before = [], None
     for k, good in enumerate(cycles(count, **options) if count > KEPT else _first_cycles(**options)[:count]):

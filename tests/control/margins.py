@@ -1,4 +1,4 @@
-"""Margins of a loop from its frequency response, and the inner loops of a robot on its flexible platform."""
+"""Margins of a loop from its frequency response, and inner loops of a robot on its flexible platform."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 import sagline as sl
 from sagline.core.arrays import Array, Indices
 
-DELAY = 1.5e-3  # s: half a period of the drives, and one to work in
-# Hz; a platform's mode is a percent wide
+DELAY = 1.5e-3  # s: half a period of the drives, and one period of computation
+# Hz; a mode of the platform has a width of a percent
 FREQUENCY = np.concatenate((np.geomspace(0.3, 10.0, 3000), np.geomspace(10.05, 200.0, 300)))
 
 
 class Margins(NamedTuple):
-    """What a loop can bear.
+    """Stability margins of a loop.
 
     Attributes:
         gain: By which its gain may change, up or down, the nearer [dB].
@@ -29,7 +29,7 @@ class Margins(NamedTuple):
 
 
 def margins(response: Array, frequency: Array) -> Margins:
-    """Of an open loop (F,), complex, that is stable when it is closed with negative feedback."""
+    """Margins of an open loop (F,), complex, that is stable when closed with negative feedback."""
     size, turn = np.log10(np.abs(response)), np.unwrap(np.angle(response))
     crossing = np.flatnonzero(np.diff(np.sign(size)))
     share = size[crossing] / (size[crossing] - size[crossing + 1])
@@ -43,7 +43,7 @@ def margins(response: Array, frequency: Array) -> Margins:
 
 
 class Axis(NamedTuple):
-    """The drives of a robot at an equilibrium, all alike: J_e s'' = u + T, u = -(k_v + k_i/s)(k_p + s) s.
+    """Equal drives of a robot at an equilibrium: J_e s'' = u + T, u = -(k_v + k_i/s)(k_p + s) s.
 
     Attributes:
         inertia: J_e of motor, gear and drum at the cable [kg].
@@ -65,7 +65,7 @@ class Axis(NamedTuple):
 
 
 def axis(state: sl.Equilibrium, damping: sl.Damping) -> Axis:
-    """The drives at an equilibrium; the air's damping of the cables acts at their ends, a third of it."""
+    """Drives at an equilibrium; a third of the air damping of the cables acts at their ends."""
     robot, m = state.one_robot, state.one_robot.cable_count
     winch = robot.winches
     assert winch is not None
@@ -82,7 +82,7 @@ def axis(state: sl.Equilibrium, damping: sl.Damping) -> Axis:
 
 
 def _air(state: sl.Equilibrium, damping: float) -> Array:
-    """Wrench against a unit velocity of the platform, (6, 6)."""
+    """Wrench for a unit velocity of the platform, (6, 6)."""
     robot, matrix = state.one_robot, state.pose.matrix
     levers = (robot.platform_anchors - robot.center_of_mass) @ matrix.T
     reach = robot.frame_anchors - state.pose.position - robot.platform_anchors @ matrix.T
@@ -96,7 +96,7 @@ def _air(state: sl.Equilibrium, damping: float) -> Array:
 
 
 def inner_loops(drives: Axis, delay: float = DELAY) -> Array:
-    """Open loops, one at a time, the others closed, on the flexible platform; complex, shape (F, m)."""
+    """Open loops, each with the others closed, on the flexible platform; complex, shape (F, m)."""
     a, b, c, d = drives.system
     m, s = b.shape[1], 2j * np.pi * FREQUENCY
     poles, shapes = np.linalg.eig(a)
@@ -116,7 +116,7 @@ def closed_poles(drives: Axis, delay: float = DELAY) -> Array:
 
 
 def closed_loops(drives: Axis, delay: float = DELAY) -> Array:
-    """Platform and drums with all loops closed, as A of dx/dt = A x; each delay as its quotient of second order.
+    """Platform and drums with all loops closed, as A of dx/dt = A x; delays as rational functions of second order.
 
     e^(-s h) = 1 - (12/h) s/(s^2 + 6 s/h + 12/h^2): q1' = q2, q2' = w - (6/h) q2 - (12/h^2) q1, u = w - (12/h) q2.
     """

@@ -1,4 +1,4 @@
-"""Constants and codes of the protocol between controller and PLCs; `sagline.control` itself does not offer them."""
+"""Constants and codes of the protocol between controller and PLCs, for tests of other folders."""
 
 from sagline.control.link import (
     COUNTERS,

@@ -21,14 +21,14 @@ HOME = sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)
 
 @cache
 def prototype() -> sl.Robot:
-    """As it is planned for: load cells without noise, encoders with a zero."""
+    """The planned machine: load cells without noise, encoders with a zero."""
     robot = sl.load_robot("article-prototype")
     assert robot.winches is not None
     return robot.replace(winches=robot.winches.replace(length_zero=3.0))
 
 
 def imperfect(zero: float = 0.0, noise: float = 1.0, bias: float = 2.0, seed: int = 5) -> sl.Robot:
-    """The same with load cells as they are, and encoders whose zeros are wrong by so much, rms [m]."""
+    """The same with noisy load cells, and encoders with a given error of zeros, rms [m]."""
     robot, random = prototype(), np.random.default_rng(seed)
     signs, errors = random.choice([-1.0, 1.0], 8), random.standard_normal(8)
     errors *= zero / np.sqrt(np.mean(errors**2))
@@ -36,17 +36,17 @@ def imperfect(zero: float = 0.0, noise: float = 1.0, bias: float = 2.0, seed: in
 
 
 def with_zero_errors(robot: sl.Robot, errors: Array, **fields: Any) -> sl.Robot:
-    """A robot with so much more cable off its drums than its encoders say [m], and other fields of its winches."""
+    """A robot with additional cable off its drums relative to its encoders [m], and changed fields of its winches."""
     assert robot.winches is not None
     assert robot.winches.length_zero is not None
     return robot.replace(winches=robot.winches.replace(length_zero=robot.winches.length_zero + errors, **fields))
 
 
 class Busy:
-    """The link of a controller that stands for 20 to 50 ms now and then, as on a busy computer; the machine goes on."""
+    """A link whose controller sometimes stops for 20 to 50 ms, as on a busy computer, while the machine continues."""
 
     def __init__(self, link: Any, seed: int) -> None:
-        """Stand before a link."""
+        """Wrap a link."""
         self._link, self.groups, self.period = link, link.groups, link.period
         self._random = np.random.default_rng(seed)
 
@@ -62,10 +62,10 @@ class Busy:
 
 
 class Spy:
-    """A link that keeps what goes through it."""
+    """A link that records all messages."""
 
     def __init__(self, link: Any) -> None:
-        """Stand before a link."""
+        """Wrap a link."""
         self.link, self.groups, self.period = link, link.groups, link.period
         self.commands: list[Command | None] = []
         self.answers: list[Sample | Missing] = []
@@ -81,10 +81,10 @@ class Spy:
 
 
 class Replay:
-    """A link that answers what was answered before, whatever is sent."""
+    """A link that repeats recorded answers to any command."""
 
     def __init__(self, spy: Spy) -> None:
-        """Begin at the beginning."""
+        """Start with the first answer."""
         self.groups, self.period, self._answers = spy.groups, spy.period, iter(spy.answers)
         self.commands: list[Command | None] = []
 
@@ -97,12 +97,12 @@ class Replay:
 
 
 class Watcher:
-    """One who looks on, and calls a function in a cycle."""
+    """An observer that calls a function in one cycle."""
 
     stopped = ""
 
     def __init__(self, at: int = -1, call: Any = None) -> None:
-        """See everything; call once, in the cycle with this number of those that move."""
+        """Observe everything, and call the function once, in the motion cycle with this number."""
         self.cycles: list[Recorded] = []
         self.told: list[tuple[Any, ...]] = []
         self._at, self._call, self.count = at, call, 0
@@ -128,7 +128,7 @@ SPIES: WeakKeyDictionary[Controller, Spy] = WeakKeyDictionary()  # of the contro
 
 
 def rig(true: sl.Robot | None = None, home: bool = True, seed: int = 1, **settings: Any) -> tuple[Controller, Machine]:
-    """A controller that is connected, and homed, and its machine."""
+    """A connected and homed controller, and its machine."""
     machine = Machine(true or prototype(), nominal=prototype(), start=HOME, seed=seed)
     link = Spy(machine.link())
     control = Controller(prototype(), link, seed=2, **settings)
@@ -140,12 +140,12 @@ def rig(true: sl.Robot | None = None, home: bool = True, seed: int = 1, **settin
 
 
 def spy_of(control: Controller) -> Spy:
-    """Link of a controller of `rig`, which keeps what goes through it."""
+    """Link of a controller of `rig` that records all messages."""
     return SPIES[control]
 
 
 def state_of(control: Controller) -> State:
-    """What it does now."""
+    """Present state of the controller."""
     return control.state
 
 
@@ -155,7 +155,7 @@ def at(x: float, y: float, z: float) -> sl.Pose:
 
 
 def rest(control: Controller, machine: Machine, seconds: float) -> Array:
-    """Where the true platform is on average while it stands [m], shape (3,)."""
+    """Mean position of the true platform at rest [m], shape (3,)."""
     places = []
     for _ in range(round(seconds / control.period)):
         control.cycle()

@@ -1,4 +1,4 @@
-"""The prototype, its home position and the ten positions of the article's Table 2, with the plan of all of them."""
+"""The prototype, its home position and the ten positions of Table 2 of the article, with a plan of all of them."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ GROUPS = ((0, 1), (2, 3), (4, 5), (6, 7))
 
 
 def agreeing() -> Sample:
-    """Of four groups that agree."""
+    """Sample of four groups in agreement."""
     four, eight = np.ones(4), np.ones(8)
     whole, none = four.astype(np.int64), np.zeros(8, dtype=np.int64)
     return Sample(
@@ -77,7 +77,7 @@ MISHAPS = [
 
 @pytest.mark.parametrize(("mishap", "why"), MISHAPS)
 def test_a_lasting_disagreement_cannot_be_acknowledged(mishap: str, why: str) -> None:
-    """It could be, and the next path moved the platform by 94 mm with six winches of eight."""
+    """Formerly it could be, and the next path moved the platform by 94 mm with six of eight winches."""
     control, machine = rig()
     machine.inject(mishap)
     for _ in range(60):
@@ -129,14 +129,14 @@ def test_locked_drums_are_released_before_connecting() -> None:
     with pytest.raises(RefusedError, match=r"group 0, 1, 2, 3: .*locked"):
         control.connect()
     assert state_of(control) is State.OFF
-    assert machine.time - began < 0.3  # no use in waiting
+    assert machine.time - began < 0.3  # waiting does not help
     machine.reset()
     control.connect()
     assert state_of(control) is State.READY
 
 
 def owners(machine: Machine) -> set[int]:
-    """Owners of the groups, as their blocks have them."""
+    """Owners of the groups in their blocks."""
     return {report.owner for group in range(4) if (report := machine.report(group)) is not None}
 
 

@@ -23,7 +23,7 @@ def way(rate: float = RATE) -> Path:
 
 
 def moved(path: Path, shift: Array) -> Path:
-    """The same with poses shifted [m], shape (N, 3), and twists left as they are."""
+    """The same with shifted poses [m], shape (N, 3), and unchanged twists."""
     pose = sl.Pose.from_quaternion(path.pose.position + shift, path.pose.quaternion)
     return Path(path.time, pose, path.twist, path.twist_rate, path.jerk)
 
@@ -34,11 +34,11 @@ def planned(robot: sl.Robot, path: Path) -> object:
 
 @pytest.mark.parametrize("jump", [1e-3, 6e-3, None])
 def test_a_jump_of_poses_without_a_twist_is_refused(jump: float | None) -> None:
-    """6 mm between two ticks were 3.4 mm of cable, which no winch can do, and the twist knew nothing of it."""
+    """6 mm between two ticks were 3.4 mm of cable, too fast for a winch, without a twist."""
     path = way()
     half = len(path.time) // 2
     shift = np.zeros((len(path.time), 3))
-    if jump is None:  # a slow drift that the twist does not know: 20 um a tick
+    if jump is None:  # a slow drift that is not in the twist: 20 um per tick
         shift[:, 2] = 2e-5 * np.arange(len(path.time))
     else:
         shift[half:, 2] = jump
@@ -71,14 +71,14 @@ def test_winches_that_are_too_fast_after_a_jump_are_named() -> None:
     with pytest.raises(RefusedError, match=r"winch \d .* 314 rad/s"):
         planned(robot, moved(path, shift))
     fastest = 0.9 * float((limit * winches.drum_radius / np.abs(winches.gear)).min()) * PERIOD
-    shift *= fastest / 0.02  # of the platform, slower than of a winch: refused by the other check
+    shift *= fastest / 0.02  # of the platform, slower than of a winch: the other check refuses it
     with pytest.raises(RefusedError, match=r"cable \d .* mm"):
         planned(robot, moved(path, shift))
 
 
 PATHS = [
     lambda: way(),
-    lambda: sl.quintic_path([(0, 0, 1.5), (0.3, 0.2, 1.4), (0.1, -0.3, 1.2)], speed=0.3),  # its end is beside a tick
+    lambda: sl.quintic_path([(0, 0, 1.5), (0.3, 0.2, 1.4), (0.1, -0.3, 1.2)], speed=0.3),  # its end is not at a tick
 ]
 
 
@@ -88,7 +88,7 @@ def test_consistent_paths_are_accepted(path: object) -> None:
 
 
 def test_the_load_of_a_motor_has_the_sign_of_the_tension() -> None:
-    """A motor that takes cable in works against the cable: it needs force and tension together, not their difference.
+    """A motor that winds in works against the cable: it needs the sum of force and tension, not the difference.
 
     The limit is put between the two, so that a load of the other sign would let the path through, or refuse a second.
     """
@@ -120,7 +120,7 @@ def test_the_load_of_a_motor_has_the_sign_of_the_tension() -> None:
 
 
 def test_a_motion_of_another_period_or_robot_is_refused() -> None:
-    """Of 100 ms a row, followed in cycles of 10 ms, it was ten times as fast."""
+    """Rows of 100 ms in cycles of 10 ms are ten times as fast."""
     control, _ = rig()
     slow = plan_motion(prototype(), way(rate=10.0), 0.1, sl.Catenary(), sl.Closest())
     with pytest.raises(RefusedError, match=r"100 ms.* 10 ms"):

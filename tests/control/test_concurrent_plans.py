@@ -20,7 +20,7 @@ PATIENCE = 60.0  # s
 
 
 class Instant(Pace):
-    """Real time that passes at once: plans are made in a thread, and a cycle does not wait for a tick."""
+    """Real time that passes at once: plans are made in a thread, and cycles do not wait for ticks."""
 
     def wait(self) -> float:
         time.sleep(1e-4)
@@ -49,7 +49,9 @@ def test_ctrl_c_does_not_wait_for_a_plan() -> None:
     watcher.cycle = lambda cycle: (  # type: ignore[method-assign]
         signal.raise_signal(signal.SIGINT) if time.monotonic() > begun + 0.2 and control.homed else None
     )
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may start this with Ctrl-C ignored
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # a shell can start this process with Ctrl-C ignored
     release = threading.Event()
     try:
         with pytest.raises(KeyboardInterrupt):

@@ -43,7 +43,7 @@ def test_the_platform_reaches_the_commanded_pose() -> None:
     done = control.go_to(at(0.1, -0.1, 1.45))
     assert done.status is ExecutionStatus.DONE
     assert state_of(control) is State.IDLE
-    assert np.linalg.norm(done.position[-1] - [0.1, -0.1, 1.45]) < 2e-4  # the drives' integrals are still at it
+    assert np.linalg.norm(done.position[-1] - [0.1, -0.1, 1.45]) < 2e-4  # the integrals of the drives still change
     rest(control, machine, 2.0)
     assert np.linalg.norm(rest(control, machine, 2.0) - [0.1, -0.1, 1.45]) < 5e-5
     assert np.linalg.norm(control.estimate.position - [0.1, -0.1, 1.45]) < 1e-5
@@ -84,7 +84,7 @@ def test_commands_have_consecutive_counters_and_feasible_set_points() -> None:
     followed = [command for command in commands if command.mode is Mode.FOLLOW]
     lengths, rates = (np.array([getattr(command, name) for command in followed]) for name in ("length", "rate"))
     steps = np.diff(lengths, axis=0)
-    assert np.abs(steps - 0.5 * control.period * (rates[1:] + rates[:-1])).max() < 2e-5  # no jump anywhere
+    assert np.abs(steps - 0.5 * control.period * (rates[1:] + rates[:-1])).max() < 2e-5  # no jump in any cycle
     assert all(np.isfinite(row).all() for command in followed for row in command[4:7])
 
 
@@ -143,14 +143,14 @@ def test_a_pause_stays_on_the_path_and_resume_reaches_its_end() -> None:
     set_at = control.estimate.position.copy()
     rest(control, machine, 0.5)
     assert np.linalg.norm(control.estimate.position - set_at) < 1e-4
-    assert abs(set_at[1]) + abs(set_at[2] - 1.5) < 2e-5  # on its way
+    assert abs(set_at[1]) + abs(set_at[2] - 1.5) < 2e-5  # on the path
     control.resume()
     done = control.wait()
     assert done.status is ExecutionStatus.DONE
     assert np.linalg.norm(done.position[-1] - [0.1, 0.0, 1.5]) < 2e-4
     assert len(done) > len(paused)
     followed = np.array([command.length for command in sent(control) if command.mode is Mode.FOLLOW])
-    assert np.abs(np.diff(followed, 2, axis=0)).max() < 3e-5  # no kink: 0.1 m/s to rest in 0.2 s is 5e-5 a cycle^2
+    assert np.abs(np.diff(followed, 2, axis=0)).max() < 3e-5  # no corner: 0.1 m/s to rest in 0.2 s is 5e-5 per cycle^2
 
 
 def test_a_stop_is_synchronous_and_a_new_path_continues_without_a_jump() -> None:
@@ -268,7 +268,7 @@ def test_a_reading_controller_sends_nothing_and_estimates_the_pose() -> None:
 
 
 def test_homing_proposes_a_jog_until_tensions_agree() -> None:
-    # what no motion of the platform eases
+    # the part that no motion of the platform reduces
     tight = -6e-3 * sl.stiffness(sl.inverse(prototype(), HOME).state).null_lengths[:, 0]
     control, _ = rig(with_zero_errors(prototype(), tight), home=False)
     control.connect()
@@ -308,7 +308,7 @@ def test_a_jog_during_homing_ends_at_a_tension_limit() -> None:
     assert re.search(r"cable \d", control.events[-1].text)
     assert control.sample is not None
     planned = sl.inverse(prototype(), HOME).state.cables.frame_end_tension
-    assert (control.sample.tension / planned).max() < 1.4  # it took the PLC's ramp to stand
+    assert (control.sample.tension / planned).max() < 1.4  # it stopped with the ramp of the PLC
 
 
 def test_a_jog_beyond_the_limits_is_refused() -> None:
@@ -342,7 +342,9 @@ def test_ctrl_c_stops_the_machine_and_a_second_one_has_no_effect() -> None:
     watcher = Watcher(60, press)
     control, _ = rig(record=watcher)
     watcher.count = 0
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may start this with Ctrl-C ignored
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # a shell can start this process with Ctrl-C ignored
     try:
         with pytest.raises(KeyboardInterrupt):
             control.go_to(at(0.1, 0.1, 1.5))
@@ -424,7 +426,7 @@ def test_a_link_of_another_robot_is_refused() -> None:
 
 @pytest.mark.parametrize("period", [0.005, 0.02])
 def test_plcs_of_another_period_are_refused(period: float) -> None:
-    """At 5 ms the platform went through a path of 10 ms a row at double speed."""
+    """With 5 ms the platform followed a path of 10 ms per row at double speed."""
     machine = Machine(prototype(), start=HOME, seed=1, period=period)
     with refused("link", f"of PLCs with a period of {1e3 * period:g} ms", kind=sl.InvalidValueError) as caught:
         Controller(prototype(), machine.link(), seed=2)
@@ -444,5 +446,5 @@ def test_samples_of_an_execution_are_the_received_ones() -> None:
     done = control.go_to(at(0.02, 0.0, 1.5))
     answers = [answer for answer in spy_of(control).answers if isinstance(answer, Sample)][-len(done) :]
     for k in (0, len(done) - 1):
-        for kept, given in zip(done.samples.at(k)[:-1], answers[k][:-1], strict=True):  # all but the reasons
+        for kept, given in zip(done.samples.at(k)[:-1], answers[k][:-1], strict=True):  # all except the reasons
             assert np.array_equal(kept, given)  # type: ignore[arg-type]

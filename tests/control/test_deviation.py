@@ -27,11 +27,11 @@ def test_errors_are_measured_minus_planned_and_nan_without_a_plan() -> None:
 
 
 def test_constant_errors_of_lengths_are_visible_and_wrench_errors_are_not() -> None:
-    """With a filter of no time the error is what it is; six of the eight directions are a wrench."""
+    """With a filter time of zero the error is not filtered; six of the eight directions are a wrench."""
     done, plan = execution(), plan_of()
     row = null_space(plan.state[0])
-    mendable = 10.0 * np.linalg.svd(row.visible)[0][:, 0]  # the largest direction of what lengths change
-    wrench = np.linalg.svd(row.visible)[2][-1]  # what the matrix takes to nothing
+    mendable = 10.0 * np.linalg.svd(row.visible)[0][:, 0]  # the largest direction that lengths change
+    wrench = np.linalg.svd(row.visible)[2][-1]  # in the null space of the matrix
     for error, wanted in ((mendable, row.visible @ mendable), (wrench, np.zeros(8))):
         held = {name: getattr(done, name) for name in done.__slots__}
         read = {name: getattr(done.samples, name) for name in done.samples.__slots__}

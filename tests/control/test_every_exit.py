@@ -71,7 +71,7 @@ def ready(control: Controller) -> None:
 
 
 def idle(control: Controller) -> None:
-    """It is."""
+    """The initial state."""
 
 
 def mended(control: Controller, machine: Machine) -> None:
@@ -89,7 +89,7 @@ def connecting_in_vain(control: Controller, machine: Machine) -> None:
 
 
 def falls(begin: Callable[[Controller], object], what: str) -> Drive:
-    """Something goes wrong after a beginning."""
+    """A fault after a beginning."""
 
     def drive(control: Controller, machine: Machine) -> None:
         begin(control)
@@ -100,7 +100,7 @@ def falls(begin: Callable[[Controller], object], what: str) -> Drive:
 
 
 def both(first: Drive, second: Drive) -> Drive:
-    """One after the other."""
+    """Both steps in order."""
 
     def drive(control: Controller, machine: Machine) -> None:
         first(control, machine)
@@ -110,12 +110,12 @@ def both(first: Drive, second: Drive) -> Drive:
 
 
 def asked(what: Callable[[Controller], object]) -> Drive:
-    """The operator asks for it."""
+    """A request of the operator."""
     return lambda control, machine: what(control)
 
 
 def does(begin: Callable[[Controller], object], then: Callable[[Controller], object]) -> Drive:
-    """Something is asked for after a beginning."""
+    """A request after a beginning."""
 
     def drive(control: Controller, machine: Machine) -> None:
         begin(control)

@@ -20,18 +20,18 @@ from tests.refusal import refused
 from tests.tiers import extended, wide
 
 START = 40  # cycle; the prototype moves
-FALLING = -1.0  # N m at a motor: 667 N that its cable pulls
-# names of faults, as events and logs have them
+FALLING = -1.0  # N m at a motor: a cable force of 667 N
+# names of faults in events and logs
 DEAD_CELL, GROUP_ACTS, NOT_FOLLOWING = "cell zero or saturated", "group acts by itself", "group does not follow"
 
 
 def since(alter: Callable[[int, Cycle], Cycle], start: int = START, end: int = 10**9) -> Change:
-    """What is altered from a cycle on, by how long ago that is."""
+    """Changes from a cycle on, depending on the time since then."""
     return lambda k, cycle: alter(k - start, cycle) if start <= k < end else cycle
 
 
 def silent(group: int, count: int, start: int = START) -> Change:
-    """A group sends no new data for so many cycles."""
+    """A group sends no new data for a number of cycles."""
     last: list[Sample] = []
 
     def alter(k: int, cycle: Cycle) -> Cycle:
@@ -52,12 +52,12 @@ def silent(group: int, count: int, start: int = START) -> Change:
 
 
 def cell(index: int, reading: Callable[[int, float], float], torque: float | None = None) -> Change:
-    """A cell reads a function of the time since START and of what is there, its motor perhaps holds something else."""
+    """A cell reads a function of the time since START and of the true tension; its motor can hold another one."""
 
     def alter(k: int, cycle: Cycle) -> Cycle:
         sample = cycle.sample
         value = reading(k, float(sample.tension[index]))
-        fields = {"tension": one(sample.tension, index, value + 0.01 * (k % 7))}  # none sticks
+        fields = {"tension": one(sample.tension, index, value + 0.01 * (k % 7))}  # no cell is constant
         if torque is not None:
             fields["torque"] = one(sample.torque, index, torque)
         return with_sample(cycle, **fields)
@@ -66,7 +66,7 @@ def cell(index: int, reading: Callable[[int, float], float], torque: float | Non
 
 
 def field(name: str, index: int, value: float, start: int = START, end: int = 10**9) -> Change:
-    """One value of the sample is another."""
+    """One value of the sample is replaced."""
     return since(
         lambda k, cycle: with_sample(cycle, **{name: one(getattr(cycle.sample, name), index, value)}), start, end
     )
@@ -77,7 +77,7 @@ def both(first: Change, second: Change) -> Change:
 
 
 def broken(index: int, others: float = 5.0) -> Change:
-    """The others change by so much more each cycle, in turn up and down."""
+    """The others change by a given amount in each cycle, alternately up and down."""
     turns = np.where(np.arange(8) % 2, 1.0, -1.0)
 
     def alter(k: int, cycle: Cycle) -> Cycle:
@@ -92,7 +92,7 @@ def broken(index: int, others: float = 5.0) -> Change:
 
 
 def slackens(index: int) -> Change:
-    """Bit by bit, as a plan does that is wrong; the others take over."""
+    """Slowly, as with a wrong plan; the others take the load."""
 
     def alter(k: int, cycle: Cycle) -> Cycle:
         sample = cycle.sample
@@ -119,7 +119,7 @@ def jump(index: int, by: float) -> Change:
 
 
 def lags(index: int, speed: float) -> Change:
-    """A drum stays behind, and its encoder says so."""
+    """A drum lags, and its encoder shows it."""
     return since(
         lambda k, cycle: with_sample(
             cycle,
@@ -148,7 +148,7 @@ def drive_trips(k: int, cycle: Cycle) -> Cycle:
 
 
 def emergency(k: int, cycle: Cycle) -> Cycle:
-    """As a PLC does it: the power is off, the drums are locked, it says why."""
+    """As by a PLC: power off, drums locked, reason reported."""
     if k < START:
         return cycle
     bits = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
@@ -161,13 +161,13 @@ def emergency(k: int, cycle: Cycle) -> Cycle:
 
 
 class Case(NamedTuple):
-    """A fault that is injected at START.
+    """A fault injected at START.
 
     Attributes:
-        change: What is done.
-        names: What is told, in order, each once.
-        reaction: The largest of it.
-        cycles: How many cycles later the last of it is told, at most and at least.
+        change: Change of the samples.
+        names: Reported faults in order, each once.
+        reaction: The strongest reaction.
+        cycles: Largest and smallest delay of the last report in cycles.
         words: Pattern of the item and the numbers in its line.
     """
 
@@ -304,7 +304,7 @@ def test_a_fault_is_reported_once_in_time_and_alone(name: str) -> None:
     for each in found:
         assert len(each.line) < 250
         assert each.line.isprintable()
-        assert each.line.endswith(".")  # with what to do
+        assert each.line.endswith(".")  # with the next step
         assert ". " in each.line
 
 
@@ -365,7 +365,7 @@ def test_smaller_deviations_are_no_fault(name: str) -> None:
     ],
 )
 def test_a_faultless_machine_raises_no_fault(options: dict[str, Any], count: int) -> None:
-    """Noise, bias, friction, lost blocks, a load that is another, commands on their way: 20 s, or 14 minutes."""
+    """Noise, bias, friction, lost blocks, another load, delayed commands: 20 s, or 14 minutes."""
     assert told(None, count, seed=11, **options) == []
 
 
@@ -381,13 +381,13 @@ def test_a_wrong_load_cell_is_named_for_any_load(index: int, error: float) -> No
 
 
 def test_an_oscillation_is_no_wrong_load_cell() -> None:
-    """Sign changes of more than the width of the tolerance, from one cycle to the next."""
+    """Sign changes larger than the tolerance from one cycle to the next."""
     names = []
     for offset in (0.0, 60.0):
         rules, before, found = faults_of(ROBOT, cell_deviation=0.05, cell_bias=0.0), None, set()
         for k, good in enumerate(cycles(150)):
             swing = 60.0 if k % 50 < 25 else -60.0
-            tension = good.tension + one(np.zeros(8), 1, offset or swing) + 1e-3 * (k % 7)  # none sticks
+            tension = good.tension + one(np.zeros(8), 1, offset or swing) + 1e-3 * (k % 7)  # no cell is constant
             cycle = with_sample(good, tension=tension, torque=-tension * 0.03 / 20.0)._replace(before=before)
             found |= {rule.name for rule in rules if rule.look(cycle) is not None}
             before = cycle.sample
@@ -453,11 +453,11 @@ def test_without_a_plan_tensions_are_not_compared() -> None:
 
 
 def test_a_fault_present_at_the_start_is_reported_at_once() -> None:
-    """Rules begin to look when the connection has seen all groups agree, or the operator's word was taken for it."""
+    """Rules start when the connection has seen all groups agree, or after a confirmation by the operator."""
     left = field("fault", 1, GroupFault.HEARTBEAT, start=0, end=30)
     assert [(each.name, each.cycle) for each in told(left, 60)] == [(GROUP_ACTS, 0)]
     taken = told(field("owner", 2, 99, start=0), 60)
-    assert [(each.name, each.cycle) for each in taken] == [("owner lost", 1)]  # there is a command from then on
+    assert [(each.name, each.cycle) for each in taken] == [("owner lost", 1)]  # a command exists from then on
 
 
 def test_a_released_grant_is_no_fault() -> None:
@@ -494,7 +494,7 @@ def test_a_constant_load_cell_at_rest_is_no_fault() -> None:
 
 
 def test_a_delayed_set_point_is_no_following_error() -> None:
-    """At 0.37 m/s and five cycles of delay set points are 19 mm ahead of the drums."""
+    """At 0.37 m/s and with five cycles of delay, set points are 19 mm ahead of the drums."""
     ahead = [
         np.abs(cycle.command.length - cycle.sample.length).max()
         for cycle in cycles(400, delay=5)
@@ -597,7 +597,7 @@ def test_sets_of_rules_are_independent() -> None:
 
 
 def test_consequences_of_a_stop_are_reported_only_for_doubtful_lengths() -> None:
-    """A drive trips, its PLC says so; later another drum slips, and then its servo is at its limit."""
+    """A drive trips and its PLC reports it; later another drum slips, and its servo reaches its limit."""
     late_jump = since(lambda k, cycle: with_sample(cycle, length=_added(cycle.sample.length, 1, 0.003)), START + 20)
     later = both(late_jump, field("state", 3, WinchState.SATURATED))
     found = told(both(drive_trips, later), 145)
@@ -609,7 +609,7 @@ def test_consequences_of_a_stop_are_reported_only_for_doubtful_lengths() -> None
 
 def test_simultaneous_stops_of_groups_are_one_event() -> None:
     def stops(k: int, cycle: Cycle) -> Cycle:
-        acting = k >= START and k % 12 < 6  # a command to hold clears it for a while
+        acting = k >= START and k % 12 < 6  # a command to hold clears it temporarily
         return with_sample(cycle, fault=np.full(4, int(GroupFault.HEARTBEAT))) if acting else cycle
 
     found = told(stops, 145)
@@ -618,7 +618,7 @@ def test_simultaneous_stops_of_groups_are_one_event() -> None:
 
 
 def test_a_sudden_stop_of_drums_is_no_jump() -> None:
-    """Locked at 0.3 m/s: a length is 3 mm less than its rate promised."""
+    """Locked at 0.3 m/s: a length is 3 mm shorter than its rate predicts."""
 
     def locked(k: int, cycle: Cycle) -> Cycle:
         if k < 300:
@@ -632,7 +632,7 @@ def test_a_sudden_stop_of_drums_is_no_jump() -> None:
 
 
 def test_a_jump_is_found_with_rates_from_the_same_encoder() -> None:
-    """A PLC that takes the rate of a period from its counts says that the drum was fast."""
+    """A PLC that computes the rate from its counts reports a fast drum."""
 
     def alter(k: int, cycle: Cycle) -> Cycle:
         if k < START:
@@ -668,7 +668,7 @@ def test_a_nan_reading_does_not_hide_faults_of_others(name: str, reading: float)
     case, motor = CASES[name], course().tension[START][6] * -0.0015
 
     def dead(k: int, cycle: Cycle) -> Cycle:
-        """Since before the motion."""
+        """Failed before the motion."""
         tension, torque = one(cycle.sample.tension, 6, reading), one(cycle.sample.torque, 6, motor)
         return with_sample(cycle, tension=tension, torque=torque)
 
@@ -701,7 +701,7 @@ def test_untrusted_cells_are_replaced_by_planned_tensions() -> None:
 
 
 def stops_at(standing: int, reads_only: bool) -> Change:
-    """Set points, or drums, that stand from a cycle on."""
+    """Set points or drums that stop at a cycle."""
 
     def alter(k: int, cycle: Cycle) -> Cycle:
         if k < standing or cycle.command is None:
@@ -716,7 +716,7 @@ def stops_at(standing: int, reads_only: bool) -> Change:
 
 @pytest.mark.parametrize("reads_only", [False, True])
 def test_faults_at_the_end_of_a_stop_are_reported(reads_only: bool) -> None:
-    """The ramp ends 20 cycles after a drive tripped, and 21 more the motion counts as stopped."""
+    """The ramp ends 20 cycles after a drive trips, and the motion counts as stopped 21 cycles later."""
     silent_group = silent(1, 10**6, START + 5)
     tight = since(
         lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 3, 2100.0 + k)), START + 80, START + 85
@@ -814,7 +814,7 @@ def test_the_load_estimate_is_kept_while_a_cable_is_slack() -> None:
 
 
 def test_a_motor_torque_within_friction_does_not_prove_a_taut_cable() -> None:
-    """26 N planned, nothing read, 20 N held, of which 15 N may be friction."""
+    """26 N planned, no reading, 20 N held, of which 15 N can be friction."""
 
     def doubtful(k: int, cycle: Cycle) -> Cycle:
         if k < START:

@@ -13,7 +13,7 @@ from tests.control.stops import HOME, PROTOTYPE
 from tests.tiers import extended
 
 BIAS = np.array([2.0, -1.0, 1.5, -2.0, 0.5, 2.0, -2.0, 1.0])  # N
-CASES = {  # what happens: what is told, the state that follows, within how many ms each
+CASES = {  # injected fault: reported fault, following state, and the largest delay of each in ms
     "cell 3 reads 0 N": ((("cell zero or saturated", 30),), None),
     "cell 5 fails": ((("cell lost", 10),), (State.STOPPING, 10)),
     "cable 2 breaks": ((("cable broken", 40),), (State.EMERGENCY, 40)),
@@ -30,7 +30,7 @@ MORE = {
     "load grows by 5 kg": ((), None),
     "load grows by -10 kg": ((), None),
     "servo 3 is limited to 60 N": (
-        (("following error", 200), ("group acts by itself", 600)),  # which is told when the others stand
+        (("following error", 200), ("group acts by itself", 600)),  # reported when the others stop
         (State.STOPPING, 200),
     ),
     "servo 3 trips": ((("group acts by itself", 20),), (State.STOPPING, 20)),
@@ -57,7 +57,7 @@ MORE = {
 
 
 def happens(what: str) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
-    """Faults that are told and states that are entered when it happens amid a motion, each with its time [ms]."""
+    """Reported faults and entered states after an injection during a motion, each with its time [ms]."""
     winch = PROTOTYPE.winches
     assert winch is not None
     home = sl.Pose(HOME, np.eye(3))
@@ -96,7 +96,7 @@ def test_a_fault_is_reported_once_and_leads_to_its_state_in_time(what: str) -> N
 @extended
 @pytest.mark.parametrize("seed", range(2))
 def test_a_busy_computer_causes_no_encoder_fault(seed: int) -> None:
-    """Drives catch up as fast as they can with what they were told late."""
+    """Drives follow late commands as fast as they can."""
     machine = sl.twin.Machine(PROTOTYPE, seed=seed)
     control = sl.control.Controller(PROTOTYPE, Busy(machine.link(), seed), seed=1)
     control.connect()

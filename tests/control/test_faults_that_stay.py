@@ -22,7 +22,7 @@ Edit = Callable[[Sample], Sample]
 
 
 class Edited:
-    """A link that changes what the machine says, from when it is told to."""
+    """A link that changes the samples of the machine from a given time on."""
 
     def __init__(self, link: Any) -> None:
         self._link, self.groups, self.period = link, link.groups, link.period
@@ -37,7 +37,7 @@ class Edited:
 
 
 class Clock(Pace):
-    """A clock on which nobody waits, and every cycle is late by so much."""
+    """A clock without waiting, on which every cycle has a given delay."""
 
     late = 0.0
 
@@ -46,7 +46,7 @@ class Clock(Pace):
 
 
 class Stage(NamedTuple):
-    """What a case may lay hands on."""
+    """Objects that a case may change."""
 
     control: Controller
     machine: Machine
@@ -56,12 +56,12 @@ class Stage(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A fault that stays.
+    """A lasting fault.
 
     Attributes:
-        begin: What brings it about.
-        name: What is told first.
-        state: That follows within 60 cycles and stays.
+        begin: Cause of the fault.
+        name: The first reported fault.
+        state: State that follows within 60 cycles and lasts.
     """
 
     begin: Callable[[Stage], None]
@@ -78,7 +78,7 @@ def injects(what: str) -> Callable[[Stage], None]:
 
 
 def reads(cable: int, tension: float, torque: float) -> Callable[[Stage], None]:
-    """A cable that pulls so much, as cell and motor agree."""
+    """A cable with a given tension in load cell and motor."""
     return edits(
         lambda sample: sample._replace(
             tension=one(sample.tension, cable, tension + 1e-3 * (sample.counter[0] % 7)),
@@ -106,7 +106,7 @@ GOES_ON = {
 
 
 def set_off(true: sl.Robot | None = None, moves: bool = True, **settings: Any) -> Stage:
-    """A controller that is homed, and under way."""
+    """A homed controller during a motion."""
     machine = Machine(true or prototype(), nominal=prototype(), start=HOME, seed=1)
     link, clock, watcher = Edited(machine.link()), Clock(), Watcher()
     control = Controller(prototype(), link, pace=clock, record=watcher, seed=2, **settings)
@@ -157,7 +157,7 @@ def test_a_correction_at_its_limit_stops_and_asks_for_homing() -> None:
     assert not control.homed
 
 
-@extended  # test_controller.py has it with links of one machine
+@extended  # test_controller.py tests links of one machine
 def test_a_second_controller_is_refused_and_the_first_continues() -> None:
     stage = set_off()
     beside = stage.machine.link(moves=False)

@@ -19,7 +19,7 @@ from tests.refusal import refused
 
 
 def changed(control: Controller, change: Any) -> None:
-    """From now on samples are changed by a function."""
+    """Change the samples by a function from now on."""
     spy: Any = spy_of(control)
     good = spy.exchange
 
@@ -61,7 +61,7 @@ def test_a_jog_ends_if_tensions_are_nan_or_old(change: Any, ruled: bool, why: st
         control.cycle()
     assert moves(control)
     changed(control, change)
-    if not ruled:  # whatever the rules for faults say
+    if not ruled:  # independent of the fault rules
         control._context.faults, control._context.degrading = (), []
     for _ in range(2):
         control.cycle()
@@ -97,7 +97,7 @@ def test_repeated_samples_are_counted_once() -> None:
     for k in range(WINDOW - 1):
         assert not homing.look(good._replace(counter=good.counter + k))
     counter = good.counter + WINDOW - 1
-    counter[2] -= 1  # of one group alone
+    counter[2] -= 1  # of one group only
     for _ in range(3):
         assert not homing.look(good._replace(counter=counter))
     assert homing.look(good._replace(counter=good.counter + WINDOW))
@@ -118,7 +118,7 @@ def test_precision_of_cells_is_that_of_the_robot() -> None:
     robot = prototype()
     assert robot.winches is not None
     deviation, bias = cell_errors(robot)
-    assert (deviation.tolist(), bias.tolist()) == ([1.0] * 8, [2.0] * 8)  # what it does not say
+    assert (deviation.tolist(), bias.tolist()) == ([1.0] * 8, [2.0] * 8)  # default values
     noisy = robot.replace(winches=robot.winches.replace(load_cell_deviation=3.0, load_cell_bias=-4.0))
     deviation, bias = cell_errors(noisy)
     assert (deviation.tolist(), bias.tolist()) == ([3.0] * 8, [4.0] * 8)

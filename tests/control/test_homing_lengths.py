@@ -22,7 +22,7 @@ TARGET = at(0.2, -0.4, 1.4)
 
 
 def displaced(by: Any, robot: sl.Robot | None = None, seed: int = 1) -> tuple[Controller, sl.twin.Machine]:
-    """A connected controller; its encoders are right, its platform is not at HOME."""
+    """A connected controller with correct encoders, and a platform away from HOME."""
     nominal = robot or prototype()
     place = HOME.position + np.asarray(by, dtype=float)[:3]
     start = sl.Pose.from_euler(place, *np.asarray([*by, 0.0, 0.0, 0.0], dtype=float)[3:6])
@@ -33,7 +33,7 @@ def displaced(by: Any, robot: sl.Robot | None = None, seed: int = 1) -> tuple[Co
 
 
 def without_zeros() -> sl.Robot:
-    """The prototype with encoders whose zeros nobody has set."""
+    """The prototype with encoders without zeros."""
     robot = prototype()
     assert robot.winches is not None
     return robot.replace(winches=robot.winches.replace(length_zero=None))
@@ -70,7 +70,7 @@ def test_right_lengths_are_replaced_only_after_a_confirmation(by: Any, cable: in
     assert state_of(control) is State.IDLE
     assert control.zero == pytest.approx(STATE.unstrained_length - sample.length, abs=1e-6)
     assert re.search(rf"confirmed.* {1e3 * np.abs(control.zero).max():.2f} mm", control.events[-1].text)
-    assert np.abs(machine.reading.position - HOME.position - by).max() < 1e-4  # nothing has moved
+    assert np.abs(machine.reading.position - HOME.position - by).max() < 1e-4  # no motion
 
 
 def test_a_confirmation_is_valid_only_for_the_reported_pose() -> None:
@@ -84,7 +84,7 @@ def test_a_confirmation_is_valid_only_for_the_reported_pose() -> None:
         control.confirm_homing()
     with refused("homing", kind=RefusedError):
         control.home(HOME)
-    control.home(at(0.1, 0.0, 1.5))  # the other way: the pose that the lengths give
+    control.home(at(0.1, 0.0, 1.5))  # the reverse: the pose of the lengths
     assert state_of(control) is State.IDLE
     assert np.abs(control.zero).max() < 2e-3
 
@@ -190,7 +190,7 @@ def test_the_tolerance_follows_from_cells_encoders_and_tolerances(tmp_path: Path
 
 
 def lands(by: Array, seed: int) -> float | None:
-    """Distance of the platform from its target after a motion [m]; None if homing was refused."""
+    """Distance of the platform from its target after a motion [m]; None if homing is refused."""
     control, machine = displaced(by, imperfect(noise=1.0, bias=0.0), seed)
     try:
         control.home(HOME)
@@ -202,7 +202,7 @@ def lands(by: Array, seed: int) -> float | None:
 
 @pytest.mark.parametrize("count", [4, pytest.param(60, marks=pytest.mark.extended)])
 def test_accepted_homings_stay_within_the_tolerance(count: int) -> None:
-    """Displacements along and about all axes, from far within the tolerance of homing to far beyond it."""
+    """Displacements along and about all axes, from well within the tolerance of homing to far beyond it."""
     random = np.random.default_rng(count)
     slope = sl.stiffness(sl.inverse(prototype(), TARGET).state).length_sensitivity[:3]
     most = float(np.linalg.norm(np.abs(slope) @ tolerance(prototype())))

@@ -25,7 +25,7 @@ def visible(state: sl.Equilibrium) -> Array:
 
 
 def likeness(matrix: Array) -> Array:
-    """|cos| of the patterns that two cells leave, 0 for a cell and itself."""
+    """|cos| of the patterns of two cells, 0 for a cell and itself."""
     own = np.sqrt(np.einsum("...ii->...i", matrix))
     found: Array = np.abs(matrix / (own[..., :, None] * own[..., None, :])) * (1.0 - np.eye(8))
     return found
@@ -33,7 +33,7 @@ def likeness(matrix: Array) -> Array:
 
 @pytest.mark.parametrize("name", PLANS)
 def test_the_wrench_of_one_shortened_cable(name: str) -> None:
-    """The platform held: one length shorter, by the cable model alone."""
+    """Fixed platform: one length is shorter, by the cable model only."""
     plan = PLANS[name]()
     state, robot = plan.state, plan.state.one_robot
     slope, step = balance_slope(state), 1e-5
@@ -46,7 +46,7 @@ def test_the_wrench_of_one_shortened_cable(name: str) -> None:
 
 
 def _held(state: sl.Equilibrium, robot: sl.Robot, change: Array) -> tuple[Array, Array]:
-    """Wrench of the cables about the center of mass and T_A at the state's pose, lengths changed."""
+    """Wrench of the cables about the center of mass, and T_A, at the pose of the state with changed lengths."""
     matrix = state.pose.matrix
     levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(matrix, -1, -2)
     ends = state.pose.position[:, None] + robot.platform_anchors @ np.swapaxes(matrix, -1, -2)
@@ -76,7 +76,7 @@ def test_two_cells_resemble_each_other_and_a_load_not_too_much() -> None:
     rows = parity(state)
     own = np.einsum("...ii->...i", rows)
     assert likeness(own[..., :, None] * rows).max() == pytest.approx(0.67, abs=0.005)
-    assert 5.0 * np.hypot(1.0, 2.0) / own.min() == pytest.approx(15.8, abs=0.05)  # N that are named for certain
+    assert 5.0 * np.hypot(1.0, 2.0) / own.min() == pytest.approx(15.8, abs=0.05)  # N that are always detected
 
 
 @pytest.mark.parametrize("cell", range(8))
@@ -90,7 +90,7 @@ def test_the_wrong_cell_has_the_largest_parity_and_its_error_is_estimated(cell: 
 
 
 def moved(robot: sl.Robot, more: Array | float = 0.0) -> Array:
-    """Parity of a machine that is not the one that was planned for, at all stops, the largest [N]."""
+    """Largest parity at all stops of a machine that differs from the plan [N]."""
     plan = stops()
     there = sl.forward(robot, plan.unstrained_length + more, plan.state.pose)
     assert there.stable.all()
@@ -99,7 +99,7 @@ def moved(robot: sl.Robot, more: Array | float = 0.0) -> Array:
 
 
 def test_errors_of_the_machine_name_no_cell() -> None:
-    """11 N name one: load, stiffness, anchors, encoders all leave less."""
+    """11 N name a cell: errors of load, stiffness, anchors and encoders leave less."""
     threshold = 5.0 * np.hypot(1.0, 2.0)
     inertia = PROTOTYPE.inertia
     stiff = PROTOTYPE.cables.replace(axial_stiffness=1.2 * PROTOTYPE.cables.axial_stiffness)
@@ -113,7 +113,9 @@ def test_errors_of_the_machine_name_no_cell() -> None:
         "zeros off by 2 mm at random": moved(PROTOTYPE, 2e-3 * rng.normal(size=8)),
     }
     assert max(machines.values()) < 0.5 * threshold
-    assert moved(PROTOTYPE.replace(center_of_mass=[0.02, 0.0, 0.0])) > threshold  # a moment: more than a load's weight
+    assert (
+        moved(PROTOTYPE.replace(center_of_mass=[0.02, 0.0, 0.0])) > threshold
+    )  # a moment: more than the weight of a load
 
 
 def test_a_pose_without_lengths_has_none() -> None:

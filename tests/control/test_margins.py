@@ -22,13 +22,13 @@ STATE = stops().state[0]
 ROW = null_space(STATE)
 PLANNED = STATE.cables.frame_end_tension
 SLOPE = sl.stiffness(STATE).tension_sensitivity
-LAG = 1.0 - np.exp(-2.0 * np.pi * 10.0 * PERIOD)  # share a cycle of an inner loop of 10 Hz
+LAG = 1.0 - np.exp(-2.0 * np.pi * 10.0 * PERIOD)  # share per cycle of an inner loop of 10 Hz
 ALWAYS = {"act_above": 1e-9, "rest_below": 0.0}
 ERROR = ROW.visible @ np.array([1.0, -2.0, 0.5, 1.5, -1.0, 0.3, 2.0, -0.7])
 
 
 def outer_loop(gain: float, delay: int, turn: Array, filter_time: float = 0.5) -> Array:
-    """Open tension loop at z = exp(i turn): filter, integrator, inner loops, and so many cycles on the way."""
+    """Open tension loop at z = exp(i turn): filter, integrator, inner loops, and a number of cycles of delay."""
     z = np.exp(1j * turn)
     share = PERIOD / (filter_time + PERIOD)
     lag = LAG / (1.0 - (1.0 - LAG) / z)
@@ -37,7 +37,7 @@ def outer_loop(gain: float, delay: int, turn: Array, filter_time: float = 0.5) -
 
 
 def closed(settings: TensionSettings, delay: int, cycles: int) -> Array:
-    """Errors, cycle by cycle, of the loop itself around a linear machine with inner loops of 10 Hz and a delay."""
+    """Errors, cycle by cycle, of the loop with a linear machine with inner loops of 10 Hz and a delay."""
     loop, sent = TensionLoop(8, settings), [np.zeros(8)] * (delay + 1)
     length, errors = np.zeros(8), []
     for _ in range(cycles):
@@ -58,21 +58,21 @@ def test_the_tension_loop_has_20_db_and_55_degrees_at_any_delay_to_five_cycles(d
 
 
 def test_the_loop_has_the_computed_frequency_response() -> None:
-    """Its answer to one error, one cycle long, has the frequency response of filter and integrator."""
+    """Its response to an error of one cycle has the frequency response of filter and integrator."""
     loop = TensionLoop(8, TensionSettings(gain=0.01, **ALWAYS))
     added = [loop.step(PLANNED + (ERROR if k == 0 else 0.0), PLANNED, ROW) for k in range(6000)]
     seen = -np.array([SLOPE @ one for one in added])[:, 0] / ERROR[0]
     turn = np.array([0.01, 0.03, 0.1, 0.5])
-    steps = np.diff(seen, prepend=0.0)  # an integrator's answer does not end, its change does
+    steps = np.diff(seen, prepend=0.0)  # the response of an integrator does not end, its change does
     z = np.exp(1j * turn)
     response = (steps @ z[None, :] ** -np.arange(6000)[:, None]) / (1.0 - 1.0 / z)
     lag = LAG / (1.0 - (1.0 - LAG) / z)
-    # what is sent after a sample acts in the next cycle: z times one less
+    # a command after a sample acts in the next cycle: one factor z less
     np.testing.assert_allclose(response / z, outer_loop(0.01, 0, turn) / lag, rtol=1e-6)
 
 
 def test_the_loop_is_stable_with_20_db_and_a_second_of_delay() -> None:
-    """A gain of 0.1, the most that is taken, is ten times that of the default; 55 degrees at 0.91 rad/s are 1.05 s."""
+    """A gain of 0.1, the largest valid one, is ten times the default; 55 degrees at 0.91 rad/s are 1.05 s."""
     for settings, delay in ((TensionSettings(gain=0.1, **ALWAYS), 5), (TensionSettings(**ALWAYS), 5 + 105)):
         errors = closed(settings, delay, 6000)
         assert errors[-1000:].max() < 0.4 * errors[0]
@@ -92,7 +92,7 @@ def test_the_integrator_alone_is_stable_up_to_the_gain_of_the_formula(delay: int
 
 @pytest.mark.parametrize(("delay", "limit"), [(1, 0.48), (2, 0.32), (3, 0.25), (5, 0.17)])
 def test_the_largest_accepted_gain_is_below_the_limit_of_stability(delay: int, limit: float) -> None:
-    """With inner loops of 10 Hz and a filter of 0.5 s the limit is found by roots."""
+    """With inner loops of 10 Hz and a filter of 0.5 s, the limit follows from roots."""
     share = PERIOD / (0.5 + PERIOD)
     poles = np.polymul(np.polymul([1.0, -1.0], [1.0, -(1.0 - share)]), [1.0, -(1.0 - LAG)])
 
@@ -117,7 +117,7 @@ def integral(gain: float) -> sl.Robot:
 
 
 def inner_margins(robot: sl.Robot, count: int, above: float = 0.0) -> tuple[Margins, float]:
-    """The least over poses of the test box, the ten stops and all drives; and the least damped pole [1/s]."""
+    """Smallest margins over poses of the test box, the ten stops and all drives; and the least damped pole [1/s]."""
     box = feasible_plan(robot, count, seed=11)
     used = above < FREQUENCY
     poles, found = [], []
@@ -136,7 +136,7 @@ COUNTS = [pytest.param(16, marks=extended), pytest.param(400, marks=pytest.mark.
 
 @pytest.mark.parametrize("count", [2, *COUNTS])
 def test_the_drives_have_11_db_and_60_degrees_all_over_the_test_box(count: int) -> None:
-    """Each loop with 1.5 ms of delay, the seven others closed on the platform that swings; 8 dB and 30 degrees do."""
+    """Each loop with 1.5 ms of delay and the others closed on the swinging platform; 8 dB and 30 degrees suffice."""
     found, slowest = inner_margins(PROTOTYPE, count)
     assert found.gain >= 11.0
     assert found.phase >= 60.0
@@ -145,7 +145,7 @@ def test_the_drives_have_11_db_and_60_degrees_all_over_the_test_box(count: int) 
 
 @pytest.mark.parametrize("count", COUNTS)
 def test_ten_times_the_integral_gain_feeds_the_slowest_modes(count: int) -> None:
-    """Below sqrt(k_p k_i/k_v), 3.2 Hz, such a drive gives way ahead of the force: as much as the cables' losses take.
+    """Below sqrt(k_p k_i/k_v), 3.2 Hz, such a drive adds energy: as much as the losses of the cables dissipate.
 
     At its own bandwidth, above 8 Hz, nothing of it is seen.
     """
@@ -158,7 +158,7 @@ def test_ten_times_the_integral_gain_feeds_the_slowest_modes(count: int) -> None
 
 
 def test_friction_of_the_drives_damps_the_effect_of_the_integral_gain() -> None:
-    """At a stop whose linear model grows: a swing of the platform dies away."""
+    """At a stop with an unstable linear model, a swing of the platform decays."""
     planned = stops().state[10]
     state = replace(planned, robot=integral(80e3))
     assert closed_poles(axis(state, LOSSES)).real.max() > 0.0
@@ -171,7 +171,7 @@ def test_friction_of_the_drives_damps_the_effect_of_the_integral_gain() -> None:
 
 
 def test_margins_of_a_known_loop() -> None:
-    """k/(s (s + 1)^2): the gain may be 2/k times as large; at a gain of 1/2 the phase is 90 - 2 atan(w) degrees."""
+    """k/(s (s + 1)^2): the gain margin is 2/k; at a gain of 1/2 the phase is 90 - 2 atan(w) degrees."""
     frequency = np.geomspace(1e-2, 1e2, 20_000)
     s = 1j * frequency
     found = margins(0.5 / (s * (s + 1.0) ** 2), frequency)
@@ -180,7 +180,7 @@ def test_margins_of_a_known_loop() -> None:
 
 
 def test_linear_and_simulated_drives_agree() -> None:
-    """A small push, without friction; loops of 1 kHz that read, work and hold lag by a millisecond or less."""
+    """A small push without friction; loops of 1 kHz with reading and holding have a delay of up to a millisecond."""
     winch = PROTOTYPE.winches
     assert winch is not None
     robot = PROTOTYPE.replace(winches=winch.replace(friction=0.0))

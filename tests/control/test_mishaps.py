@@ -18,10 +18,10 @@ from tests.tiers import wide
 
 
 class Bursting(Watcher):
-    """One who looks on, until it raises: in the cycle that moves with this number, or where its state is asked for."""
+    """An observer that raises an exception: in a given motion cycle, or when its state is requested."""
 
     def __init__(self, where: str) -> None:
-        """Raise in this method."""
+        """Raise the exception in this method."""
         super().__init__(30, lambda: setattr(self, "_now", True))
         self._where, self._now = where, False
 
@@ -85,7 +85,7 @@ BURSTS: list[tuple[Any, bool]] = [
 
 @pytest.mark.parametrize(("break_it", "sends"), BURSTS)
 def test_an_exception_in_a_cycle_holds_the_winches_and_is_raised_again(break_it: Any, sends: bool) -> None:
-    """The state stayed MOVING, a set point stood in the command, and garbage was never collected again."""
+    """Formerly the state stayed MOVING with a set point in the command, and garbage was never collected again."""
     control, machine = rig()
     control.start(control.path_to(at(0.2, 0.0, 1.5)))
     for _ in range(50):
@@ -103,7 +103,7 @@ def test_an_exception_in_a_cycle_holds_the_winches_and_is_raised_again(break_it:
     assert "ArithmeticError: no" in fault.text
     assert control.execution is not None
     assert control.execution.status is ExecutionStatus.FAULT
-    if sends:  # the PLCs have it already: they stand after a ramp, though nobody calls the next cycle
+    if sends:  # the PLCs already stop with a ramp, although no next cycle is called
         assert spy_of(control).commands[-1] is control._context.sender.command
         for _ in range(22):
             machine.advance()
@@ -130,7 +130,7 @@ def test_an_exception_during_connecting_releases_the_grants() -> None:
 
 
 def test_missing_answers_stop_the_machine() -> None:
-    """A link that has no sample any more, though it had some, let every rule sleep."""
+    """Formerly a link that had lost its samples disabled all rules."""
     control, _ = rig()
     control.start(control.path_to(at(0.2, 0.0, 1.5)))
     for _ in range(50):

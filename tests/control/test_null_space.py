@@ -29,7 +29,7 @@ def changed(state: sl.Equilibrium, change: Array) -> sl.Equilibrium:
 
 
 def slope(state: sl.Equilibrium, direction: Array) -> tuple[Array, Array]:
-    """Motion of the platform's origin and change of T_A, for a meter along a direction, from two equilibria."""
+    """Motion of the platform origin and change of T_A for a meter along a direction, from two equilibria."""
     low, high = (changed(state, sign * STEP * direction) for sign in (-1.0, 1.0))
     moved = (high.pose.position - low.pose.position) / (2.0 * STEP)
     tension = (high.cables.frame_end_tension - low.cables.frame_end_tension) / (2.0 * STEP)
@@ -59,7 +59,7 @@ def test_the_correction_is_exactly_the_visible_error(name: str) -> None:
 
 @pytest.mark.parametrize("name", PLANS)
 def test_the_visible_error_is_a_projection_along_the_wrench(name: str) -> None:
-    """Rank 2, idempotent, symmetric; what it takes away is at right angles to what lengths can do."""
+    """Rank 2, idempotent, symmetric; the removed part is orthogonal to the effects of lengths."""
     known = null_space(PLANS[name]().state)
     visible = known.visible
     np.testing.assert_allclose(visible @ visible, visible, atol=1e-10)

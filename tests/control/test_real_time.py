@@ -10,7 +10,7 @@ from sagline.core.errors import InvalidValueError
 
 
 class Clock:
-    """Stands where it is put; sleeping moves it on, by a little too much."""
+    """A clock set by the test; sleeping advances it by slightly too much."""
 
     def __init__(self, over: float) -> None:
         self.now, self._over = 100.0, over
@@ -46,7 +46,7 @@ def test_a_long_cycle_is_reported_and_missed_ticks_are_skipped(
     pace = Pace(0.01)
     pace.wait()
     clock.now += 0.013
-    assert pace.wait() == pytest.approx(0.003, abs=1e-9)  # less than a period: the ticks stay where they were
+    assert pace.wait() == pytest.approx(0.003, abs=1e-9)  # less than a period: the ticks are unchanged
     assert pace.wait() == 0.0
     assert clock.now == pytest.approx(100.02, abs=1e-9)
     clock.now += 0.05

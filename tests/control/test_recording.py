@@ -13,7 +13,7 @@ M, G = 3, 2
 
 
 def made(k: int) -> Recorded:
-    """A cycle of which no two numbers are the same."""
+    """A cycle with all numbers different."""
     numbers = iter(range(1000 * k, 1000 * k + 999))
 
     def some(n: int, whole: bool = False) -> np.ndarray:

@@ -57,18 +57,18 @@ def test_between_two_rows_lengths_are_cubic_and_tensions_linear() -> None:
 
 
 def test_a_platform_jog_after_a_winch_jog_is_slow_and_the_loop_waits() -> None:
-    """The lead went within 0.4 s: 31 mm/s at a winch; and the loop took what it changed for an error."""
+    """Formerly the lead decayed within 0.4 s, 31 mm/s at a winch, and the loop treated it as an error."""
     control, _ = rig()
     control.jog(3, 8e-3)
     control.jog_platform([2e-3, 0.0, 0.0])
     followed = [command for command in spy_of(control).commands if command and command.mode == 2]
     lengths, rates = (np.array([getattr(command, name) for command in followed]) for name in ("length", "rate"))
-    assert np.abs(rates).max() < LEAD_SPEED + 0.008  # 1.5 x 2 mm in 0.4 s beside it
+    assert np.abs(rates).max() < LEAD_SPEED + 0.008  # 1.5 x 2 mm in 0.4 s in addition
     assert np.abs(np.diff(lengths, axis=0)).max() < (LEAD_SPEED + 0.008) * PERIOD
 
 
 def test_the_tension_loop_learns_nothing_from_a_lead() -> None:
-    """It took what the lead changes for an error, and changed lengths by a millimeter for nothing."""
+    """Formerly it treated the effect of the lead as an error, and changed lengths by a millimeter."""
     control, _ = rig()
     control.jog(3, 18e-3)
     x, y, z = control.estimate.position

@@ -21,7 +21,7 @@ def is_degraded(control: Controller) -> bool:
 
 
 def test_corrections_of_the_tension_loop_do_not_move_the_estimate() -> None:
-    """An encoder that reads a millimeter too much, made up for by the loop: the estimate is the truth."""
+    """An encoder with an error of a millimeter, corrected by the loop: the estimate is the truth."""
     control, _ = rig()
     off = np.zeros(8)
     off[0] = 1e-3
@@ -33,7 +33,7 @@ def test_corrections_of_the_tension_loop_do_not_move_the_estimate() -> None:
 
 
 def test_a_repaired_load_cell_is_trusted_again() -> None:
-    """There was no way out: acknowledging was refused in IDLE, and only there it was told to do so."""
+    """Formerly acknowledging was refused in IDLE, although the message proposed it only there."""
     control, machine = rig()
     machine.inject(Injected("cell sticks", 3, 0.0, machine.time + 0.2, 2.5))
     control.go_to(at(0.1, 0.0, 1.5))
@@ -51,7 +51,7 @@ def test_a_repaired_load_cell_is_trusted_again() -> None:
 
 
 def test_the_rule_for_the_correction_is_that_of_the_loop() -> None:
-    """With settings of 1 mm it was told at 5 mm: never."""
+    """Formerly, with settings of 1 mm, it was reported at 5 mm: never."""
     tight = 3e-3 * sl.stiffness(sl.inverse(prototype(), HOME).state).null_lengths[:, 0]
     control, _ = rig(with_zero_errors(prototype(), tight), loop=sl.control.TensionSettings(largest=1e-3))
     for _ in range(2000):

@@ -16,14 +16,14 @@ def test_states_with_a_grant_stop_on_a_fault() -> None:
 
 
 def test_states_with_a_grant_lead_to_emergency_until_off() -> None:
-    for state in OWNING - {State.EMERGENCY}:  # while it connects the brakes are on: it is refused
+    for state in OWNING - {State.EMERGENCY}:  # refused while connecting, when the brakes are on
         assert State.EMERGENCY in TABLE[state][1]
     assert list(TABLE[State.EMERGENCY][1]) == [State.OFF]
     assert list(TABLE[State.OFF][1]) == [State.CONNECTING]
 
 
 def test_a_robot_with_an_unknown_pose_does_not_move() -> None:
-    """Only homing, or a place that is still known, leads to where paths begin."""
+    """Only homing, or a pose that is still known, leads to the states in which paths start."""
     assert [state for state in State if State.MOVING in TABLE[state][1]] == [State.IDLE]
     assert {state for state in State if State.IDLE in TABLE[state][1]} == {
         State.READY,

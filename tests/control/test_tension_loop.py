@@ -16,13 +16,13 @@ QUIET = TensionSettings(filter_time=1e-9)  # acts on the reading itself
 
 
 def visible_error(newtons: float, row: NullSpace = ROW) -> Array:
-    """An error whose largest part is so large, and which lengths can make up."""
+    """An error with a given largest part that lengths can correct."""
     error = row.visible @ np.array([1.0, -2.0, 0.5, 1.5, -1.0, 0.3, 2.0, -0.7])
     return np.asarray(newtons / np.abs(error).max() * error)
 
 
 def hidden_error(newtons: float) -> Array:
-    """One of the wrench alone, as an unknown load makes it."""
+    """An error of the wrench only, as by an unknown load."""
     error = np.ones(8)
     error -= ROW.visible @ error
     return np.asarray(newtons / np.abs(error).max() * error)
@@ -61,7 +61,7 @@ def test_one_step_agrees_with_the_formula() -> None:
 
 
 def test_wrong_zeros_are_corrected_without_motion() -> None:
-    """Lengths wrong inside the null space: tensions come back to the plan, within the band, and the platform rests."""
+    """Length errors in the null space: tensions return to the plan, within the band, without motion of the platform."""
     zeros = 5e-3 * ROW.projection @ np.random.default_rng(5).normal(size=8)
     loop, added, moved = TensionLoop(8), np.zeros(8), 0.0
     for i in range(1000):
@@ -97,7 +97,7 @@ def test_corrections_are_limited_without_motion() -> None:
     assert np.abs(added).max() == pytest.approx(5e-3, rel=1e-12)
     assert np.abs(added).max() <= 5e-3 * (1.0 + 1e-12)
     np.testing.assert_allclose(ROW.projection @ added, added, atol=1e-16)
-    for _ in range(5000):  # it comes back from there
+    for _ in range(5000):  # it returns from there
         added = loop.step(PLANNED - visible_error(50.0), PLANNED, ROW)
     np.testing.assert_allclose(ROW.projection @ added, added, atol=1e-16)
     assert np.abs(added).max() == pytest.approx(5e-3, rel=1e-12)
@@ -116,7 +116,7 @@ def test_a_frozen_loop_only_transfers_its_corrections() -> None:
 
 @pytest.mark.parametrize("reading", [np.nan, np.inf, -np.inf])
 def test_a_nan_reading_does_not_enter_the_filter(reading: float) -> None:
-    """Afterwards the loop does what it does without that cycle."""
+    """Afterwards the loop acts as without that cycle."""
     loop, undisturbed, spoiled = TensionLoop(8), TensionLoop(8), PLANNED + visible_error(50.0)
     spoiled[2] = reading
     for each in (loop, undisturbed):

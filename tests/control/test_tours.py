@@ -9,7 +9,7 @@ from tests.tiers import extended
 
 pytestmark = extended
 
-# speed [m/s], time at a stop [s], stops: twenty seconds, and the article's fourteen minutes
+# speed [m/s], time at a stop [s], stops: twenty seconds, and the fourteen minutes of the article
 SHORT = (0.3, 1.5, 2)
 LONG = (0.047, 3.0, 10)
 RUNS = [pytest.param(SHORT, id="short"), pytest.param(LONG, id="fourteen minutes", marks=pytest.mark.soak)]
@@ -44,7 +44,7 @@ def test_the_loop_corrects_tensions_of_two_millimeter_zero_errors(
 
 
 def drift(stops: Stops) -> float:
-    """By how much corrections of the second half of the stops are larger than those of the first [m]."""
+    """Increase of the corrections from the first half of the stops to the second [m]."""
     half = len(stops.correction) // 2
     return float(stops.correction[half:].max() - stops.correction[:half].max())
 

@@ -1,4 +1,4 @@
-"""Through the article's ten poses, standing at each: what is left of errors there."""
+"""Tours of the ten poses of the article with stops: the remaining errors."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tests.control.rigs import HOME, rig
 from tests.control.stops import TEN_POSES
 
 OFF = TensionSettings(gain=0.0)
-SEEN = 1.0  # s at the end of each stop, over which is averaged: the platform swings by hundredths of a millimeter
+SEEN = 1.0  # s at the end of each stop for the mean: the platform swings by hundredths of a millimeter
 
 
 class Stops(NamedTuple):
-    """What was found at N stops.
+    """Results at N stops.
 
     Attributes:
         place: Of the true platform [m], shape (N, 3).
@@ -42,13 +42,13 @@ class Stops(NamedTuple):
 
 
 def tour(true: sl.Robot, speed: float, stand: float, count: int = 10, loop: TensionSettings | None = None) -> Stops:
-    """Home, so many of the ten poses, standing at each.
+    """Home and a number of the ten poses, with a stop at each.
 
     Args:
-        true: The robot as it is.
-        speed: Largest on the way [m/s].
-        stand: How long it stands at each [s].
-        count: Of the poses.
+        true: The true robot.
+        speed: Largest speed of the path [m/s].
+        stand: Duration of each stop [s].
+        count: Number of poses.
         loop: The tension loop.
     """
     control, machine = rig(true, loop=loop)
@@ -63,14 +63,14 @@ def tour(true: sl.Robot, speed: float, stand: float, count: int = 10, loop: Tens
         here = pose
         stops.append(_stop(control, machine, motion, stand))
         cycles += round(stand / control.period)
-    assert {event.kind.value for event in control.events[first:]} == {"state"}  # no fault, no note
+    assert {event.kind.value for event in control.events[first:]} == {"state"}  # no fault and no note
     place, tension, correction = (np.array(column) for column in zip(*stops, strict=True))
     error = np.linalg.norm(place - TEN_POSES[:count], axis=1)
     return Stops(place, error, tension, correction, acting / cycles, machine.time - begin, cycles)
 
 
 def acts(control: Controller) -> bool:
-    """Whether the tension loop acts."""
+    """True if the tension loop acts."""
     return control._context.tension_loop is not None and control._context.tension_loop.acting
 
 

@@ -1,4 +1,4 @@
-"""Runs of the fuzzer: a worker process executes cases, and its parent notices crashes, hangs and faults."""
+"""Runs of the fuzzer: a worker process executes cases, and its parent detects crashes, blocked cases and faults."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.abuse.reading import judged, sound
 from tests.fuzz.changes import change_of
 from tests.fuzz.targets import Target, targets
 
-SILENCE: Final = 60.0  # s without a new case, after which a worker hangs
+SILENCE: Final = 60.0  # s without a new case, after which a worker is blocked
 MEMORY: Final = 6 << 30  # bytes of address space
 CASES: Final = 20_000  # of one worker
 MOST_SAMPLES: Final = 60  # of one reader
@@ -67,7 +67,7 @@ def fuzz(minutes: float, seed: int, folder: Path, only: str = "") -> Found:
 
 
 def _followed(process: subprocess.Popen[str], place: Path) -> str:
-    """Wait for a worker; the reason if it crashed, hung, or reported a fault."""
+    """Wait for a worker; the reason if it crashed, blocked, or reported a fault."""
     clock = place / "clock"
     while process.poll() is None:
         time.sleep(0.2)

@@ -22,7 +22,7 @@ def compiled(caller: F, module: str = "tests") -> F:
 
     Args:
         caller: The function.
-        module: Module of the only kernel it calls; all kernels if it is none of theirs.
+        module: Module of the only kernel it calls; all kernels if it is another module.
     """
     return kept(cast("F", numba.njit(error_model="numpy")(caller)), folder_of(module) / "callers")
 

@@ -1,4 +1,4 @@
-"""Where kernels compiled by numba are kept."""
+"""Folders of kernels compiled by numba."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Memory: blocks lie beside each other, there is enough of it, and too little is told."""
+"""Memory: blocks are adjacent, the size is sufficient, and too little memory is reported."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Apply mistakes to a copy of the project, one at a time, and list the first test that catches each.
+"""Apply mistakes to a copy of the project, one at a time, and list the first test that detects each.
 
 `python -m tests.mutants [FOLDER ...] [--all-tiers] [--random N]`. Each mistake is an entry of a TOML file beside this
-one, or, with `--random`, a change that nobody chose. A copy of the project is tested with the mistake in it, first by
+one, or, with `--random`, a random change. A copy of the project is tested with the mistake in it, first by
 the tests named in the entry and those of its folder, then by the whole first tier, then, with `--all-tiers`, by the
-second. A mistake that no test catches is listed as SURVIVED.
+second. A mistake that no test detects is listed as SURVIVED.
 """
 
 from __future__ import annotations

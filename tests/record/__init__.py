@@ -1,6 +1,6 @@
 """The record of behavior: what a user of sagline can see, as numbers and names in JSON files beside this page.
 
-`make record` writes it anew; `tests/record/test_record.py` compares it in the second tier, with the tolerances of
+`make record` writes it again; `tests/record/test_record.py` compares it in the second tier, with the tolerances of
 `tests.record.compare`. A change of the source that is not meant to change behavior leaves these files as they are.
 
 - `surface.json`: names and signatures of the public surface.

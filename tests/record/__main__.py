@@ -1,4 +1,4 @@
-"""`make record`: write the record of behavior anew, all parts or those named."""
+"""`make record`: write the record of behavior again, all parts or those named."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ class Tolerance(NamedTuple):
     Attributes:
         pattern: Regular expression that is searched in the place, keys joined by slashes.
         relative: Share of the larger of both numbers.
-        absolute: Difference that is allowed besides, in the unit of the quantity.
+        absolute: Additional allowed difference, in the unit of the quantity.
     """
 
     pattern: str

@@ -200,7 +200,7 @@ def test_a_servo_at_its_limit() -> None:
     faults = np.array([sample.fault for sample in after])
     assert np.unique(faults[:, 1]).tolist() == [0, GroupFault.FOLLOWING_ERROR]
     assert (faults[:, [0, 2, 3]] == 0).all()
-    assert np.ptp(np.flatnonzero(faults[:, 1])) >= 9  # 100 ms, so that nobody misses it
+    assert np.ptp(np.flatnonzero(faults[:, 1])) >= 9  # 100 ms, so that it is in a sample
 
 
 def test_a_tripped_servo() -> None:

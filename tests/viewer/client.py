@@ -58,7 +58,7 @@ class Client:
         self.socket.send(raw)
 
     def look(self, position: Any, look_at: Any, width: int = 800) -> None:
-        """Tell where the camera is, in a picture 600 px high."""
+        """Send the pose of the camera, in a picture 600 px high."""
         eye: dict[str, Any] = {"wxyz": [1, 0, 0, 0], "up_direction": [0, 0, 1]}
         eye |= {"position": [float(x) for x in position], "look_at": [float(x) for x in look_at]}
         lens = {"fov": 1.0, "near": 0.1, "far": self.far, "image_height": 600, "image_width": width}
@@ -82,7 +82,7 @@ class Client:
         self.say(type="GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
     def met(self, server: viser.ViserServer) -> viser.ClientHandle:
-        """What a server has of this client, as soon as it has it."""
+        """The data of a server on this client, when they exist."""
         found: list[viser.ClientHandle] = []
 
         def known() -> bool:
@@ -93,7 +93,7 @@ class Client:
         return found[0]
 
     def replayed(self) -> list[dict[str, Any]]:
-        """Whatever a server tells to who comes later, all of it."""
+        """All messages that a server sends to later clients."""
         messages: list[dict[str, Any]] = []
         for message in self.heard():
             if message["type"] == "ReplayDoneMessage":

@@ -20,7 +20,7 @@ def pulled(state: sl.Equilibrium) -> np.ndarray:
 
 
 def unbalanced(state: sl.Equilibrium) -> tuple[float, float]:
-    """What is missing to a balance about the center of mass: force [N] and moment [N m]."""
+    """Residual about the center of mass: force [N] and moment [N m]."""
     robot = state.robot
     assert isinstance(robot, sl.Robot)
     force = pulled(state)

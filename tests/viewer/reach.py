@@ -12,7 +12,7 @@ SILENT: Final = ("RootWebArea", "dialog", "generic")  # roles that may have the 
 
 
 def broken_rules(page: Page) -> dict[str, list[str]]:
-    """What breaks a rule, by the rule; the browser's own tree of names is asked too."""
+    """Violations by rule, with the help of the accessibility tree of the browser."""
     page.evaluate(RULES)
     found = {rule: page.evaluate(f"window.reach.{rule}()") for rule in CHECKED}
     found["without a name"] = _silent(page)
@@ -39,7 +39,7 @@ def walked(page: Page) -> tuple[list[str], list[str], list[str]]:
 
 
 def _silent(page: Page) -> list[str]:
-    """Controls and pictures that the browser tells to a screen reader without a name."""
+    """Controls and pictures without a name for screen readers."""
     session = page.context.new_cdp_session(page)
     nodes = session.send("Accessibility.getFullAXTree")["nodes"]
     session.detach()

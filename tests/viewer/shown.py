@@ -56,7 +56,7 @@ class Shown(NamedTuple):
 
     @property
     def position(self) -> np.ndarray:
-        """Where the platform is shown [m]."""
+        """Position of the shown platform [m]."""
         assert self.viewer.view is not None
         return self.viewer.view.snapshot.pose.position
 
@@ -66,7 +66,7 @@ class Shown(NamedTuple):
         return "\n".join(piece.content for piece in self.pieces if piece.visible)
 
     def told(self, topic: str) -> Any:
-        """What browser/channel.js of all pages was told last about a topic; None if nothing."""
+        """Last message to browser/channel.js of all pages on a topic; None if there is none."""
         start = f"{NAME}:{topic}:"
         found = [piece.content for piece in self.pieces if piece.content.startswith(start)]
         return json.loads(found[-1][len(start) :]) if found else None
@@ -146,7 +146,7 @@ def updates_a_second(
     part: str = "points",
     along: str = "",
 ) -> float:
-    """How often a page is drawn anew, and a part of a node of it arrives, while a client moves by an angle [rad].
+    """Updates per second of a page, and of a part of a node, while a client moves by an angle [rad].
 
     Never, if no node follows whose name begins with `along`.
     """
@@ -163,5 +163,5 @@ def updates_a_second(
 
 
 def asked_beside(plain: float) -> float:
-    """How often a page is to be drawn that has more to do: 30 of the 60 that there can be, or half of what is here."""
+    """Required updates per second of a page with more work: 30 of at most 60, or half of the present rate."""
     return min(30.0, 0.5 * plain)

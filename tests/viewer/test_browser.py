@@ -71,9 +71,9 @@ def opened(
     found: sl.Calibration | None = None,
     cameras: list[ViewerCameraMessage] | None = None,
 ) -> Iterator[tuple[Page, ViewerPage]]:
-    """A page on a viewer; whatever the console complains of fails the test, unless it has reason to.
+    """A page on a viewer; errors of the console fail the test, unless they are expected.
 
-    All that it tells of its camera is kept, if it is to be.
+    Messages on its camera are kept on request.
     """
     server = start_server(port=0, title=robot.name)
     if cameras is not None:
@@ -116,7 +116,7 @@ def await_that(page: Page, done: Callable[[], bool]) -> None:
 
 
 def box(page: Page, selector: str) -> FloatRect:
-    """Where an element is on the page."""
+    """Position of an element on the page."""
     found = page.locator(selector).bounding_box()
     assert found is not None
     return found
@@ -148,7 +148,7 @@ def test_a_factor_changes_the_page_and_keys_undo_it(browser: Browser) -> None:
 
 
 def test_the_platform_is_lit_without_a_picture_of_surroundings(browser: Browser) -> None:
-    """Which a machine without a graphics card works at for five seconds; without light the platform would be black."""
+    """A picture of surroundings takes five seconds without a graphics card; without light the platform is black."""
     with opened(browser, sl.load_robot("falcon-7"), width=1300) as (page, _):
         found: list[np.ndarray] = []
 
@@ -303,7 +303,7 @@ def test_a_clicked_frequency_is_animated(browser: Browser) -> None:
         page.locator("tr[data-send='mode'][data-value='massless 1']").hover()
         page.mouse.down()
         page.evaluate("(() => { const list = document.querySelector('.modes'); list.innerHTML += ''; })()")
-        page.mouse.up()  # on what was written anew in between
+        page.mouse.up()  # of newly written parts
         page.get_by_text(f"{found.massless_frequency[0]:.3f} Hz, massless").wait_for()
         assert page.evaluate(OVERFLOWING) == []
         page.locator("tr[data-send='mode'][data-value='massless 1']").click()  # once more: at rest

@@ -43,7 +43,7 @@ def by_hand(viewer: ViewerPage) -> bool:
 
 
 def middle(page: Page) -> tuple[float, float]:
-    """Where the dot is on the screen; asked at once: the drawing may be written anew at any time."""
+    """Position of the dot on the screen at this moment: the drawing may be replaced at any time."""
     x, y = page.evaluate(
         f"(() => {{ const box = document.querySelector('{HANDLE} .dot').getBoundingClientRect();"
         "return [box.x + box.width / 2, box.y + box.height / 2] })()"

@@ -143,7 +143,7 @@ def test_a_browser_without_an_encoder_records_the_film_in_real_time(
         file = tmp_path / download.value.suggested_filename
         download.value.save_as(file)
         length, (first, last) = played(page, file)
-    assert length > 2.0  # the last picture stands for a moment only
+    assert length > 2.0  # the last picture is shown for a moment only
     assert first.shape == last.shape == (1080, 1920, 3)
     assert np.abs(last[976:, 1500:] - first[976:, 1500:]).max() > 64.0  # the clock
 
@@ -171,6 +171,6 @@ def test_a_picture_has_the_size_of_paper_without_gizmo_and_names(browser: Browse
 
 
 def of_gizmo(picture: Any) -> Any:
-    """Where a picture has the green of the gizmo's axis, which nothing else has."""
+    """Position of the green of the gizmo axis in a picture, which no other part has."""
     red, green, blue = np.moveaxis(picture, 2, 0)
     return (green > 150.0) & (green > red + 60.0) & (green > blue + 40.0)

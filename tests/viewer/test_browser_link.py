@@ -76,7 +76,7 @@ def test_a_pose_is_typed_and_linked(browser: Browser) -> None:
         assert np.allclose(place(), wanted, atol=1e-12)
 
 
-# what a page of somebody else tries: to open a connection, and to read the page
+# attempts of a foreign page: to open a connection, and to read the page
 INTRUDING = """async (address) => {
     const socket = new WebSocket(address.replace("http", "ws"))
     const opened = new Promise((end) => { socket.onopen = () => end("open"); socket.onerror = () => end("refused") })

@@ -28,7 +28,7 @@ def browser() -> Iterator[Browser]:
 
 
 def in_full(show: RegionFeature) -> bool:
-    """Whether the region that is drawn is that of what is shown, and not a rough one."""
+    """True if the drawn region is that of the shown state and not a coarse one."""
     return show._result is not None and not show._result[1] and show._result[0] == show._key
 
 
@@ -46,7 +46,7 @@ def slide(page: Page, label: str, way: float) -> None:
 
 
 def scene(page: Page) -> np.ndarray:
-    """What is between the panels, or above them, as far as the middle of the screen."""
+    """Scene between the panels, or above them, up to the middle of the screen."""
     picture = np.array(Image.open(BytesIO(page.screenshot())).convert("RGB"), dtype=int)
     height, width, _ = picture.shape
     return picture[: height // 2, width // 3 : 3 * width // 5]

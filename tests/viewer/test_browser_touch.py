@@ -37,7 +37,7 @@ def eye_of(viewer: ViewerPage) -> Camera | None:
 
 
 def on_page(page: Page, viewer: ViewerPage, points: np.ndarray) -> np.ndarray:
-    """Where points (..., 3) are on the page [px], shape (..., 2)."""
+    """Positions of points (..., 3) on the page [px], shape (..., 2)."""
     scene, eye = box(page, SCENE), eye_of(viewer)
     assert eye is not None
     share = eye.project(points)[0] / eye.pixels
@@ -45,7 +45,7 @@ def on_page(page: Page, viewer: ViewerPage, points: np.ndarray) -> np.ndarray:
 
 
 def settle(page: Page, viewer: ViewerPage, told: list[ViewerCameraMessage]) -> None:
-    """Wait until the page tells that its camera stands where it is to, in a scene as large as it is."""
+    """Wait until the page reports its camera at the final place, in a scene of the final size."""
 
     def stands() -> bool:
         if not told:
@@ -101,7 +101,9 @@ def test_a_mouse_pushes_cuts_and_shakes(browser: Browser, name: str, size: tuple
         np.testing.assert_array_equal(viewer.scene.dragged_pose().position, start.position)  # the gizmo did not move
         now = eye_of(viewer)
         assert now is not None
-        np.testing.assert_allclose(now.place, eye.place, rtol=1e-12)  # nor did the camera, but for how pages round
+        np.testing.assert_allclose(
+            now.place, eye.place, rtol=1e-12
+        )  # the camera did not move, except for rounding by pages
         assert page.evaluate(OVERFLOWING) == []
         # cut, by a click on the cable that is farthest from the others
         assert viewer.view is not None
@@ -127,7 +129,7 @@ def test_a_mouse_pushes_cuts_and_shakes(browser: Browser, name: str, size: tuple
 
 
 def pulled(page: Page, viewer: ViewerPage) -> float:
-    """How long the arrow of the pull is on the page [px]."""
+    """Length of the arrow of the push on the page [px]."""
     found = viewer.feature(PushFeature).response
     if found is None:
         return 0.0

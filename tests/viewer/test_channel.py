@@ -84,9 +84,9 @@ def test_an_answer_reaches_only_the_asking_client(server: PageServer, channel: C
             else:
                 raise AssertionError("not told")
     await_that(lambda: not server.get_clients())
-    channel.send_to(0, "asked", "gone")  # nobody is there
+    channel.send_to(0, "asked", "gone")  # there is no client
 
 
 def content_of(message: dict[str, Any]) -> str:
-    """What a piece of HTML says that comes or changes."""
+    """Content of a new or changed piece of HTML."""
     return str((message.get("props") or message.get("updates") or {}).get("content", ""))

@@ -31,7 +31,7 @@ def page() -> Iterator[Shown]:
 
 
 def seen_at(page: Shown, camera: CameraHandle, cable: int) -> list[float]:
-    """Where a client sees a cable with the others farthest away."""
+    """Position of a cable in the view of a client, away from the others."""
     eye = Camera.of(camera)
     assert eye is not None
     assert page.viewer.view is not None

@@ -47,7 +47,7 @@ def seen(page: Shown) -> Snapshot:
 
 
 def moved(page: Shown, client: Client, value: Any) -> Snapshot:
-    """What is shown when the dot has moved."""
+    """Update of the page after a motion of the dot."""
     before = shown_way(page)
     say(page, client, value)
     await_that(lambda: shown_way(page) is not before and isinstance(shown_way(page), ByHand))
@@ -96,7 +96,7 @@ def test_an_unbounded_polygon_is_drawn_up_to_the_known_points() -> None:
     field = dot_field_of(snapshot)
     assert field is not None
     assert None in field.sides
-    assert np.ptp(field.corners, axis=0).max() < 5e3  # not the 1e5 N that stand in for infinity
+    assert np.ptp(field.corners, axis=0).max() < 5e3  # not the 1e5 N that represent infinity
     for corner, side, after in zip(field.corners, field.sides, np.roll(field.corners, -1, axis=0), strict=True):
         tension = field.polygon.origin + 0.5 * (corner + after) @ field.polygon.basis
         at_limit = np.isclose(tension, robot.tension_min, atol=1e-6)

@@ -40,7 +40,7 @@ def taking(page: Shown) -> bool:
 
 
 def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
-    """What messages tell about a topic."""
+    """Contents of messages on a topic."""
     contents = [m.get("props", m.get("updates", {})).get("content", "") for m in messages]
     head = f"sagline:{topic}:"
     return [json.loads(content[len(head) :]) for content in contents if content.startswith(head)]

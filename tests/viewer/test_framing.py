@@ -20,7 +20,7 @@ from tests.viewer.test_push_show import POSE, look
 
 
 def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: float, field: float) -> np.ndarray:
-    """Where points are in the picture, -1 to 1 within it: OpenGL's perspective, column by column."""
+    """Positions of points in the picture, -1 to 1 inside it: perspective of OpenGL, column by column."""
     ahead = (target - camera) / np.linalg.norm(target - camera)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -69,7 +69,7 @@ def test_the_robot_stays_in_the_picture_until_the_camera_is_moved() -> None:
             look(own, 800)
             time.sleep(0.2)
             assert at(camera, own)
-            look([np.nan] * 3, 400)  # nonsense harms nobody
+            look([np.nan] * 3, 400)  # invalid data have no effect
             look(narrow, 401)
             await_that(lambda: at(camera, fitted(low, high, 401 / 600, 1.0)[0]))
     finally:

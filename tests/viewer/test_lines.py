@@ -72,7 +72,7 @@ OVER_PULLEYS = ROBOT.replace(winches=WOUND)
 
 
 def test_cables_lead_from_the_anchor_over_the_pulley_to_the_platform() -> None:
-    """Drawn lengths on the pulleys are arcs of their radius, and the cable bends nowhere else."""
+    """Lengths on pulleys are drawn as arcs with their radius, and the cable is straight elsewhere."""
     plan = sl.inverse(OVER_PULLEYS, POSE)
     assert plan.wrap_angle is not None
     wraps = shapes.wraps(OVER_PULLEYS, POSE, plan.wrap_angle)

@@ -58,7 +58,7 @@ class Asking:
         return self.answered(topic, name)
 
     def answered(self, topic: str, name: str) -> dict[str, Any]:
-        """What a question is answered."""
+        """Answer to a request."""
         start = f"sagline:{topic}-reply:"
         for message in self.client.heard(PATIENCE):
             self.seen.append(message)
@@ -98,7 +98,7 @@ def same(one: Shown, other: Shown) -> bool:
 
 
 def randomly_set(page: Shown, client: Client, random: np.random.Generator) -> None:
-    """Some of the page's controls and its platform, as somebody might."""
+    """Change some controls of the page and move its platform."""
     labels = ["Platform + load [kg]", "Cable density ×", "Cable stiffness ×", "Sag drawn ×", "Error drawn ×"]
     for label in labels:
         slider = handle(page, label)
@@ -155,7 +155,7 @@ def test_a_link_contains_all_controls(one: Shown, other: Shown) -> None:
         assert "2 numbers" not in there.ask("link", link.replace("0.125,0,-0.25", "0.125,0"))["refused"]
         here.client.set(handle(one, "Mode"), "")
         await_that(lambda: handle(one, "Mode").value == "")
-        there.ask("link", here.link())  # what is usual again is not told, and set all the same
+        there.ask("link", here.link())  # default values are omitted, and set nevertheless
         assert handle(other, "Mode").value == ""
 
 

@@ -35,7 +35,7 @@ def page() -> Iterator[Shown]:
 
 
 def moves(page: Shown) -> bool:
-    """Whether the page says which mode moves."""
+    """True if the page states which mode is animated."""
     return re.search(r"<b>[\d.]+ Hz, ", page.text) is not None
 
 
@@ -51,7 +51,7 @@ def marks_of(page: Shown) -> list[str]:
 
 
 def heard_for(client: Client, seconds: float) -> list[Any]:
-    """What comes in a while; a page that moves is never silent."""
+    """Messages of a duration; an animated page is never silent."""
     start, found = time.monotonic(), []
     for message in client.heard(0.5):
         found.append(message)
@@ -68,7 +68,7 @@ def test_a_mode_is_animated_at_the_update_rate_and_stops(page: Shown) -> None:
     found = vibration(show.swing.state, up_to=20.0)
     assert show.swing.mode.frequency == pytest.approx(found.frequency[1], rel=1e-12)
     with Client(page.url) as client:
-        await_that(lambda: len(page.server.get_clients()) == 1)  # who leaves has all shown anew
+        await_that(lambda: len(page.server.get_clients()) == 1)  # a closed client is shown everything again
         heard_for(client, 0.5)
         before = page.viewer.updates
 
@@ -205,7 +205,7 @@ def test_only_the_latest_background_result_is_used() -> None:
     assert told == [str(InvalidValueError("state", "none", "some", "Try."))]
     task.start(lambda: 1 // 0, done.append, told.append)
     await_that(lambda: bool(tasks))
-    with pytest.raises(ZeroDivisionError):  # a mistake is none of the user's
+    with pytest.raises(ZeroDivisionError):  # the error is not due to the user
         tasks.pop()()
 
 

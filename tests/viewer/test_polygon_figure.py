@@ -41,7 +41,7 @@ def test_edges_are_named_outside_of_the_polygon() -> None:
     for x, y, cable, limit in labels:
         k = sides[int(cable), limit]
         start, end = corners[k], corners[(k + 1) % len(corners)]
-        away = np.array([float(x), float(y) - 3.0]) - start  # a text stands on its line
+        away = np.array([float(x), float(y) - 3.0]) - start  # text on its baseline
         assert turn * np.linalg.det([end - start, away]) < 0.0
 
 

@@ -34,7 +34,7 @@ def push_of(state: sl.Equilibrium, size: float = 0.02) -> Push:
 
 
 def end_forces(state: sl.Equilibrium) -> np.ndarray:
-    """What the cables pull the platform with at their ends, along the level way to where they leave and up."""
+    """Forces of the cables on the platform at their ends, in the horizontal direction to their exits, and up."""
     ends = state.pose.transform(state.one_robot.platform_anchors)
     away = (state.exit_point - ends)[:, :2]
     level = away / np.linalg.norm(away, axis=1, keepdims=True)

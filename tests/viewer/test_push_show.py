@@ -48,7 +48,7 @@ def look(client: Client, page: Shown) -> CameraHandle:
 
 
 def push_of(page: Shown) -> PushResponse | None:
-    """What is pushed."""
+    """State of the push."""
     return page.viewer.feature(PushFeature).response
 
 
@@ -82,7 +82,7 @@ def test_a_push_is_proportional_to_the_distance_and_ends(page: Shown) -> None:
         assert page.node("/pushed").visible
         np.testing.assert_allclose(page.node("/pushed").position, found.loaded.pose.position, atol=1e-6)
         assert page.node("/push_tip").text.startswith(f"{np.linalg.norm(wanted):.1f} N: moves")
-        assert np.array_equal(page.position, POSE.position)  # the gizmo is none of a hand's
+        assert np.array_equal(page.position, POSE.position)  # the gizmo is not used
         pull(client, page, "end", 0.55, 0.42)
         await_that(lambda: push_of(page) is None)
         assert not page.node("/pushed").visible
@@ -121,7 +121,7 @@ def test_points_behind_the_camera_are_not_pushed(page: Shown) -> None:
     for away, held in ((5.0, False), (-5.0, True)):
         eye = Camera(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
         await_that(lambda: page.viewer.state is not None)
-        show._grab(eye, np.array([0.5, 0.5]), -1)  # nobody, whose leaving would let it go
+        show._grab(eye, np.array([0.5, 0.5]), -1)  # no client whose end would release it
         assert (show._hold is not None) == held
     show._hold = None
 

@@ -36,7 +36,7 @@ def page() -> Iterator[Page]:
 
 
 def shown_margin(page: Page, snapshot: Configuration, played: Played | None = None) -> tuple[float, str]:
-    """The margin that stands below the platform [N], and the words after it."""
+    """Margin below the platform [N], and the words after it."""
     page.feature(RegionFeature).follow(View(snapshot, SETTINGS, page.scale, ghost=False, played=played))
     label = page.server.scene.get_handle_by_name("/platform/left")
     found = re.fullmatch(r"([\d.]+) N (left|too much)(.*)", label.text)  # type: ignore[union-attr]

@@ -68,7 +68,7 @@ def test_set_estimated_and_true_platforms_are_at_their_poses(log: Path, truth: P
     drawn = scaled_position(late.pose, late.truth, 10.0)
     assert np.allclose(drawn - late.pose.position, [0.0, 0.0, -3e-2], rtol=0.0, atol=1e-8)
     assert early.truth is None  # the twin's log begins later
-    assert silent.rest is None  # there was no answer
+    assert silent.rest is None  # there was no solution
     assert np.array_equal(late.tension, done.tension[120])
     assert np.array_equal(late.length, done.length[120])
 

@@ -94,7 +94,7 @@ def test_straight_lines_are_drawn_only_if_they_differ_from_cables() -> None:
     snapshot = snapshot_at(ROBOT, HERE, Settings(mass=50.0), None)
     assert snapshot.plan is not None
     sag = snapshot.plan.state.cables.sag
-    apart = 0.042  # m: two cables hang less below their chords, the others visibly more
+    apart = 0.042  # m: two cables sag less below their chords, the others visibly more
     assert np.abs(sag - apart).min() > 0.1 * apart
     for sag_scale in (0.0, 1.0, 3.0):
         ghosts = chord_segments(snapshot, sag_scale, apart).reshape(ROBOT.cable_count, -1, 2, 3)

@@ -37,7 +37,7 @@ def ball(asked: WorkspaceQuery, rough: bool, told: Callable[[int, int], None]) -
 
 
 class Maker:
-    """What gives the hull."""
+    """Source of the hull."""
 
     hull = staticmethod(ball)
 
@@ -187,7 +187,7 @@ def test_a_hull_follows_a_slider_and_the_previous_one_stays_until_then(
     assert "60 kg, roughly" in page.text
     going.set()
     await_that(lambda: "70 kg<" in page.text)
-    assert ended == ["given up"]  # what nobody waits for any more is not worked out
+    assert ended == ["given up"]  # results that are no longer needed are not computed
     client.set(mass, 50.0)
     await_that(lambda: "50 kg<" in page.text)
 

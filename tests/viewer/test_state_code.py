@@ -62,7 +62,7 @@ def a_pose(robot: sl.Robot, random: np.random.Generator) -> sl.Pose:
 
 
 def settings(robot: sl.Robot, random: np.random.Generator) -> Settings:
-    """Any that the page's controls give, and ways of sharing with arguments of their own."""
+    """Settings of all controls of the page, and tension methods with arguments."""
     lightest, heaviest, step = mass_range(robot.mass)
     steps = int(random.integers(round((heaviest - lightest) / step)))
     method = list(METHODS.values())[int(random.integers(len(METHODS)))]
@@ -172,7 +172,7 @@ def page() -> Iterator[Shown]:
 
 
 def asked(page: Shown, topic: str, text: Any, name: str = "me-1") -> dict[str, Any]:
-    """What a page is answered."""
+    """Answer to a page."""
     with Client(page.url) as client:
         field = handle(page, "sagline")
         client.set(field, json.dumps({"topic": topic, "value": [name, text], "count": 0}))

@@ -387,7 +387,7 @@ def test_a_cut_is_played_alone_and_undo_restores_both_runs() -> None:
 
 @extended
 def test_a_long_run_is_sent_quickly() -> None:
-    """600,000 samples of eight cables: the page is told in a blink."""
+    """600,000 samples of eight cables: the page receives its data in a moment."""
     time = np.linspace(0.0, 600.0, 600_000)
     values = np.random.default_rng(1).normal(size=(600_000, 8))
     marks = tuple((float(k), "x", False) for k in range(1000))

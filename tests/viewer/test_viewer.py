@@ -227,7 +227,7 @@ def test_a_run_plays_pauses_and_ends_with_a_drag(film: Shown) -> None:
         assert np.array_equal(film.position, PATH.pose.position[0])
         tell(film, client, "play", True)
         await_that(lambda: film.position[0] > 0.5)
-        seen = film.position  # it goes on
+        seen = film.position  # it continues
         index = int(np.argmin(np.abs(PATH.pose.position[:, 0] - seen[0])))
         assert np.array_equal(seen, PATH.pose.position[index])
         await_that(lambda: not film.told("clock")["playing"] and film.position[0] == 2.0)

@@ -120,7 +120,7 @@ def test_the_true_volume_is_within_the_error_bar(kind: str, seed: int) -> None:
         level, volume = both([level, lambda p: (p - center) @ normal]), volume / 2.0
     elif kind == "infinite":
         solid = brick(center, half)
-        level = lambda p: np.where(solid(p) >= 0.0, np.inf, -np.inf)  # noqa: E731 - of what stands above
+        level = lambda p: np.where(solid(p) >= 0.0, np.inf, -np.inf)  # noqa: E731
     found = boundary(level, LOW, HIGH, cells=cells, refine=bool(seed % 2))
     assert abs(found.volume - volume) <= found.volume_error
     assert found.volume_error < 0.5 * (2.0 / cells)  # and is small

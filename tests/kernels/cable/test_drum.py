@@ -99,7 +99,7 @@ def test_the_distance_to_the_exit_agrees_with_a_triangle(radius: float) -> None:
     length = np.empty((2, 1))
     lengths_of_turns(row, starts, locked(np.array([[0.0], [10.0]])), length)
     straight = 10.0 * np.hypot(2 * np.pi * (radius + 0.002), 0.006)
-    # 60 mm off at 0.8 m: 2.25 mm, as told in docs/model.md
+    # 60 mm off at 0.8 m: 2.25 mm, as in docs/model.md
     assert length[0, 0] - length[1, 0] - straight == pytest.approx(np.hypot(0.8, 0.06) - 0.8, abs=1e-14)
     assert np.hypot(0.8, 0.06) - 0.8 == pytest.approx(2.25e-3, abs=0.005e-3)
 

@@ -51,7 +51,7 @@ def test_forces_agree_with_least_squares() -> None:
         found = lsq_linear(matrix, right, (low, high), method="bvls", tol=1e-14)
         left, change = search(matrix, right, low, high, 3)
         assert left == pytest.approx(float(np.linalg.norm(found.fun)), abs=1e-8)
-        if left > 1e-6:  # the direction is a proof: the cables supply no more along it than already used
+        if left > 1e-6:  # the direction is a proof: the cables supply at most the used force along it
             along = change.direction @ matrix
             gap = change.direction @ right - np.maximum(along * low, along * high).sum()
             assert gap == pytest.approx(left, rel=1e-7)
