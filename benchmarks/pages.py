@@ -14,8 +14,8 @@ from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.cables.models import Catenary
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.kinematics.inverse_rows import solve_inverse_rows
-from sagline.share.calls import MODULE
 from sagline.share.machine import courses_at, model_data
+from sagline.share.packing import MODULE
 from sagline.share.page import robot_page
 from sagline.statics.tables import pose_rows
 from sagline.tension.method import kernel_options

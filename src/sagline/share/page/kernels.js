@@ -1,4 +1,4 @@
-/* The compiled kernels: a WebAssembly module and its calls, as `sagline.share.calls` describes them. */
+/* The compiled kernels: a WebAssembly module and its calls, as `sagline.share.packing` describes them. */
 "use strict";
 
 const kernels = (() => {
