@@ -55,6 +55,10 @@ def is_whole(content: bytes) -> bool:
 
 def sources_of(module: str, sources: Path) -> frozenset[Path]:
     """Source files below the folder of the kernels on which the machine code of `module` depends."""
+    if not sources.joinpath(*module.split(".")).with_suffix(".py").is_file():
+        return frozenset(
+            sources.rglob("*.py")
+        )  # a kernel outside the folder, such as a benchmark, may call all kernels
     waiting, found = {module, "with_numba"}, set[Path]()
     while waiting:
         name = waiting.pop()
@@ -78,8 +82,7 @@ def _imported(source: str) -> frozenset[str]:
 
 def cache_folder(module: str, sources: Path = SOURCES) -> Path:
     """Folder of the machine code of a module's kernels."""
-    # a kernel outside this folder, such as a benchmark, may call all kernels
-    return FOLDER / digest(sources, sources_of(module, sources) or sources.rglob("*.py"))
+    return FOLDER / digest(sources, sources_of(module, sources))
 
 
 @cache

@@ -41,12 +41,13 @@ def test_slopes_by_length_density_and_stiffness(model: sl.CableModel, end: tuple
     given = (Model(*model.terms(9.81)), span, rise, Material(DENSITY, AXIAL), length, Force(*map(float, forces)))
     plane = cable_stiffness(*given)
     found = force_slopes(*given, plane)
+    slopes = (found.by_length, found.by_density, found.by_stiffness)
     expected = (
         central(lambda v: force(length=v), length, 1e-5),
         central(lambda v: force(density=v), DENSITY, 1e-3),
         central(lambda v: force(axial=v), AXIAL, 1e-3),
     )
-    for slope, right in zip(found, expected, strict=True):
+    for slope, right in zip(slopes, expected, strict=True):
         np.testing.assert_allclose(slope, right, rtol=1e-6, atol=1e-7 * np.abs(right).max())
     if isinstance(model, sl.Elastic | sl.Catenary):
         assert force_by_length(*given, plane) == found.by_length
