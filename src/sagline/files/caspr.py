@@ -15,6 +15,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files import robot_xml as xml
 from sagline.files.reading import exists, value_errors
+from sagline.files.robot_xml import Imported
 from sagline.robot.checks import MotionPattern
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -38,9 +39,7 @@ _JOINTS: Final[dict[str, tuple[MotionPattern, _Vector | None]]] = {
 }
 
 
-def load_caspr(
-    source: str | os.PathLike[str], cables: Cable | None = None, cable_set: str | None = None
-) -> xml.Imported:
+def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cable_set: str | None = None) -> Imported:
     """Read a CASPR robot with one platform.
 
     Cables in CASPR have no weight, and ideal cables do not stretch. Without the argument `cables`, missing values are

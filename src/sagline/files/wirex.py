@@ -16,6 +16,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.files import robot_xml as xml
 from sagline.files.reading import value_errors
+from sagline.files.robot_xml import Imported
 from sagline.robot.checks import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot, box_inertia
 from sagline.robot.winch import Winch
@@ -26,7 +27,7 @@ _VERSIONS: Final = ("0.31", "0.32")
 _INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows writes 1.#INF
 
 
-def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> xml.Imported:
+def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
     """Read a robot file of WireX (version 0.31 or 0.32 of its format).
 
     WireX does not require material, inertia or limits. Missing values are assumed and listed in the robot's `assumed`.
@@ -71,7 +72,7 @@ def _check_generation(root: Element) -> None:
         )
 
 
-def _robot(root: Element, name: str, cables: Cable | None) -> xml.Imported:
+def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
     robot = xml.only_child(root, "robot", "models")
     chains = robot.findall("geometry/chain")
     if not chains:

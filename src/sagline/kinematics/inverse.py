@@ -20,6 +20,7 @@ from sagline.core.progress import Progress
 from sagline.kernels import codes
 from sagline.kinematics import inverse_rows
 from sagline.kinematics.forward_rows import Winding, checked_winding
+from sagline.kinematics.inverse_rows import Given
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
@@ -49,7 +50,7 @@ def inverse(
     *,
     winding: Winding | None = None,
     stability: bool = True,
-    given: Sequence[inverse_rows.Given] | None = None,
+    given: Sequence[Given] | None = None,
     level: float = 0.0,
     progress: Progress | None = None,
 ) -> Plan:
