@@ -115,7 +115,7 @@ ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual minus desired
 
 
 class Explanation(NamedTuple):
-    """Best fit to the measured positions by errors of some parameters; the errors are within plausible limits."""
+    """Errors of some parameters, within plausible limits, that fit the measured positions best."""
 
     parameters: Model  # the parameters, k of them
     values: Array  # errors of the parameters in their units, shape (k,)

@@ -213,7 +213,7 @@ def _flat(field: Array, shape: tuple[int, ...]) -> Array:
 
 
 def _shaped(field: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """The result or operand `field` in the shape of the batch, (...), write-locked."""
+    """The field with the name `field`, of the result or of the inputs, in the shape of the batch, (...), read-only."""
     whole = field.size == math.prod(shape)
     return locked(field.reshape(shape) if whole else np.broadcast_to(field, shape))
 

@@ -323,7 +323,7 @@ def variance_factors(
 def _information(own: list[Array], z: Array, covariance: Array) -> tuple[Array, Array]:
     """Traces of P U_g, (G,), and of P U_g P U_h, (G, G).
 
-    P: projection on the residuals of whitened slopes z; U: covariance of the readings by each group of errors.
+    P: projection on fit residuals for whitened slopes z; U: covariance of the readings by each group of errors.
     """
     along = [np.swapaxes(part, 1, 2) @ z for part in own]
     steps = [each @ covariance for each in along]

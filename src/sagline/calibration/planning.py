@@ -328,7 +328,7 @@ def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: 
 
 
 def _driving_order(chosen: CandidatePoses) -> Indices:
-    """Order of a short tour of the positions; at each position, by increasing sum of tensions."""
+    """Order of the poses: a short tour of the positions, and at each position by increasing sum of tensions."""
     _, first, place = np.unique(chosen.place, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
     rank[shortest_tour(chosen.poses[first, :3])] = np.arange(len(first))

@@ -243,7 +243,7 @@ class Fault(ABC):
         lasting: True if the fault remains until a new set of rules is created; each faulty item is reported once.
         quiet: Time after a report [s]. Repeated faults in this time are only counted.
         present: True if the condition holds. While another fault stops the winches, the value does not change.
-        seen: Evidence that all rules of the set use.
+        seen: Evidence, which all rules of the set use.
     """
 
     name: ClassVar[str]

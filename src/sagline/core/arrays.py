@@ -60,7 +60,7 @@ def checked(
 
 
 def numbers(value: ArrayLike, item: str, unit: str) -> Array:
-    """Float64 copy of a caller's real numbers in C order, of any shape and range, also NaN; no mask, no unit."""
+    """Float64 copy of real numbers in C order. Any shape and value is valid, also NaN; no mask, no unit."""
     if type(value) in (float, np.float64):
         return np.array(value)
     _refuse_masked_or_with_unit(value, item, unit)

@@ -69,10 +69,10 @@ def equilibria(
 ) -> Equilibria:
     """Stable equilibria of a robot at given lengths, found by a search over orientations.
 
-    For a fixed orientation the energy is convex in the position. Therefore only orientations are searched. The
-    orientations of the starts are uniformly random. Each orientation has only one equilibrium position, at which its
-    start is placed. A robot without rotations has exactly one equilibrium. For other robots the list can be incomplete,
-    because no start may reach an equilibrium.
+    For a fixed orientation the energy is convex in the position, so only orientations are searched. The orientations of
+    the starts are uniformly random. The search of an orientation starts at its only equilibrium position. A robot
+    without rotations has exactly one equilibrium. For other robots the list can be incomplete, because no start may
+    reach an equilibrium.
 
     Args:
         robot: The robot, with m cables.

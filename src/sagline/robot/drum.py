@@ -206,7 +206,7 @@ def drum_tension(state: Equilibrium) -> Array:
 
     Along an exact cable without friction, T + T^2/(2 EA) - w z is constant (z is the height). With the other models,
     the cable between pulley and drum has no weight, and its tension is the chord tension. The tension of a slack cable
-    that leaves a drum downward is negative; NaN if it would compress the cable to a negative length. docs/model.md,
+    that leaves a drum downward is negative. It is NaN if the cable length becomes negative. docs/model.md,
     section 10.
     """
     robot, cables = state.one_robot, state.cables

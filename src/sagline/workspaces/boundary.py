@@ -125,7 +125,7 @@ INWARD: Final = 0.01  # distance, relative to a cell, from a vertex to the posit
 def uncertain_volume(level: Level, surface: Surface, uncertainty: Array, cell: float) -> float:
     """Volume [m^3] between the boundaries of two level functions that differ by `uncertainty`, (V,), at the vertices.
 
-    The slope at a vertex is computed with a position inside. cell: edge of a cell [m]; the distance between the two
+    The slope at a vertex uses a position inside the set. cell: edge of a cell [m]; the distance between the two
     boundaries is limited to this length.
     """
     k = np.flatnonzero(uncertainty > 0.0)

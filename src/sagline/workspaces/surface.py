@@ -1,4 +1,4 @@
-"""Closed surfaces of triangles, the components of the set inside a surface, and walks between the components.
+"""Closed surfaces of triangles, components of the set inside a surface, and walks between these components.
 
 A thin part of a set can be between the nodes of a grid; then the inside nodes form several components although the set
 is connected. Such a part is found by a path from one component to another, along the nodes with the highest values.

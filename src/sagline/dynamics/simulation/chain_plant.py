@@ -139,7 +139,7 @@ class ChainPlant(Plant):
         self._set_node_speeds(velocity + np.cross(spin, self._ends @ turning.T), given.rate)
 
     def _set_node_speeds(self, at_platform: Array, rate: Array) -> None:
-        """Interpolate the node speeds between both cable ends. The speed at the frame includes the paid-out cable."""
+        """Interpolate node speeds between both cable ends. The speed at the frame includes that of paid-out cable."""
         table, place, speed, n = self._chains[0], self._chains[1], self._chains[2], self.nodes
         at_exit = (rate / table[:, c.ELEMENT])[:, None] * (place[:, :, n - 1] - place[:, :, n])
         share = np.linspace(0.0, 1.0, n + 1)

@@ -63,7 +63,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     the result is the cable stiffness of `stiffness`.
 
     Args:
-        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
+        state: A single equilibrium; a plan or a solution with a single pose; or a robot and a pose.
         frequency: Frequencies [Hz], >= 0, shape (F,), or a single number.
         damping: Energy losses of the vibration; None: no losses. A modal_damping zeta acts as the loss factor 2 zeta of
             the whole stiffness. Every mode then has the damping ratio zeta.

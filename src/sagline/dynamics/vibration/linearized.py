@@ -94,7 +94,7 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
     The static gains are the compliance and the sensitivities of `stiffness`. The poles are the frequencies of `modes`.
 
     Args:
-        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
+        state: A single equilibrium; a plan or a solution with a single pose; or a robot and a pose.
             An unstable equilibrium has unstable poles.
         damping: Damping with `loss_time` (to first order) or `modal_damping`; by default no damping.
         inputs: Inputs of the winches: "lengths" (off the drums), or "speeds" (rates of these lengths, with the lengths

@@ -241,7 +241,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     response that follows from the exact dynamic stiffness of the cables.
 
     Args:
-        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
+        state: A single equilibrium; a plan or a solution with a single pose; or a robot and a pose.
         frequency: Frequencies [Hz], >= 0, shape (F,).
         damping: Energy losses. None: no losses, and an infinite response at the natural frequencies. A modal_damping
             zeta acts as the loss factor 2 zeta of the whole stiffness, as in `dynamic_stiffness`.

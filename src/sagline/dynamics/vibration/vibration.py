@@ -160,7 +160,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
     cable and normal to the plane. An independent exact count checks the number of modes.
 
     Args:
-        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
+        state: A single equilibrium; a plan or a solution with a single pose; or a robot and a pose.
         up_to: Upper limit of the mode frequencies [Hz], > 0; by default 20 Hz.
         damping: Energy losses of the vibration, for `loss`; None: no losses.
 
