@@ -82,7 +82,7 @@ _AGAIN: Final = "Try again; if this continues, check the program of the PLC."
 def disagreement(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
 ) -> tuple[Refusal | None, bool]:
-    """First reason why a group does not agree, and True if the operator must act; None if all groups agree.
+    """First reason why a group does not agree, and True if the operator must act; (None, False) if all agree.
 
     A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not locked,
     and it has accepted one of the last commands. General reasons are checked before special reasons.

@@ -11,7 +11,6 @@ from array import array
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from pathlib import Path as FilePath
 from types import MappingProxyType
 from typing import Final, NamedTuple, cast
 
@@ -39,7 +38,7 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?\s*")
 class CsvTable:
     """Table with columns of numbers in SI."""
 
-    path: FilePath  # the file, for messages
+    path: Path  # the file, for messages
     columns: dict[str, Array]  # name and numbers of each column, shape (rows,)
     lines: array[int]  # line number of each row in the file, from 1
     header: int  # line number of the header
@@ -48,7 +47,7 @@ class CsvTable:
     @classmethod
     def read(
         cls,
-        path: FilePath,
+        path: Path,
         text: str,
         units: Mapping[str, str],
         strangers: Mapping[str, str] = _NONE,
@@ -129,7 +128,7 @@ def column_of_cable(name: str) -> str:
 
 
 def _factors(
-    path: FilePath, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
+    path: Path, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
 ) -> dict[str, float | None]:
     """Factor that converts each column to SI, by the name of the column; None without a unit."""
     factors: dict[str, float | None] = {}
@@ -148,7 +147,7 @@ def _factors(
     return factors
 
 
-def _factor(path: FilePath, line: int, name: str, unit: str, wanted: str) -> float:
+def _factor(path: Path, line: int, name: str, unit: str, wanted: str) -> float:
     try:
         if unit.strip():
             return cast(float, in_si(f"1 {unit.strip()}", wanted, name))  # equal texts give equal numbers
@@ -158,7 +157,7 @@ def _factor(path: FilePath, line: int, name: str, unit: str, wanted: str) -> flo
     raise line_error(path, line, f"the unit of {name} is [{unit}]; allowed: {allowed}")
 
 
-def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], gaps: Collection[str]) -> list[float]:
+def _numbers(path: Path, line: int, row: list[str], names: tuple[str, ...], gaps: Collection[str]) -> list[float]:
     if row[0].lstrip().startswith("#"):
         raise line_error(path, line, "a comment; allowed: comments above the names of the columns")
     if len(row) != len(names):
@@ -177,7 +176,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
     return cast(list[float], numbers)
 
 
-def line_error(path: FilePath, line: int, reason: str) -> FileError:
+def line_error(path: Path, line: int, reason: str) -> FileError:
     """Create the FileError for the line with the number `line`."""
     found = FileError(path, f"line {line}: {reason}", f"Correct line {line}.", item=f"line {line}")
     found.value, _, found.allowed = reason.partition("; allowed: ")

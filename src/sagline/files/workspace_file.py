@@ -32,16 +32,11 @@ from sagline.workspaces.wrench_sets import WrenchSet
 if TYPE_CHECKING:
     from xarray import Dataset
 
-_CRITERIA: Final = (
-    "LeastMargin",
-    "MaximumSag",
-    "PositionError",
-    "LeastStiffness",
-    "LeastFrequency",
-    "Clearance",
-    "InFrame",
+_CRITERIA: Final[tuple[type[Criterion], ...]] = (
+    *(criteria.LeastMargin, criteria.MaximumSag, criteria.PositionError, criteria.LeastStiffness),
+    *(criteria.LeastFrequency, criteria.Clearance, criteria.InFrame),
 )
-CRITERIA: Final[dict[str, type[Criterion]]] = {name: getattr(criteria, name) for name in _CRITERIA}
+CRITERIA: Final = {kind.__name__: kind for kind in _CRITERIA}
 NODES: Final = ("x", "y", "z")  # coordinates of the nodes of the grid
 FINE: Final = ("fine_x", "fine_y", "fine_z")  # coordinates of the finer grid that separates components
 

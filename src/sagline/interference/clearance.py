@@ -62,7 +62,8 @@ class ClearanceRows:
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> tuple[Array, Array, Array]:
-        """Distance of every pair at every pose. With `together`, only the smallest distance of each pose is exact."""
+        """Distances of every pair at every pose. With `together`, only the smallest distance of each pose is exact."""
+        # value [m] (N, P), proved lower bound [m] (N, P), nearest points [m] (N, P, 2, 3); NaN without tensions
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3))

@@ -19,12 +19,11 @@ SUFFIX: Final = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 FOLDER: Final = SOURCES / "compiled"
 FILES: Final = (f"kernels{SUFFIX}", f"kernels_v3{SUFFIX}")
 SHORT_MEMORY, WRONG_TYPES = 1, -1
-# functions of Python's stable interface, in the order of `Python` in python.c
-_FUNCTIONS: Final = (
-    "PyObject_GetBuffer PyBuffer_Release PyTuple_Size PyTuple_GetItem PyFloat_AsDouble PyLong_AsLongLong "
-    "PyObject_IsTrue PyErr_Occurred PyErr_Clear PyEval_SaveThread PyEval_RestoreThread"
+FUNCTIONS: Final = (  # functions of Python's stable interface, in the order of `Python` in python.c
+    *("PyObject_GetBuffer", "PyBuffer_Release", "PyTuple_Size", "PyTuple_GetItem", "PyFloat_AsDouble"),
+    *("PyLong_AsLongLong", "PyObject_IsTrue", "PyErr_Occurred", "PyErr_Clear"),
+    *("PyEval_SaveThread", "PyEval_RestoreThread"),
 )
-FUNCTIONS: Final = _FUNCTIONS.split(" ")
 
 # letter of a format -> conversion of a number, and member of its slot
 CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {

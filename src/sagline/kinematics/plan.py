@@ -236,7 +236,10 @@ class Plan(Result, Saved, Tabular):
 
 
 def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
-    """Rates of the unstrained lengths (N, m) along `path`, accurate to 1e-8 of the largest; NaN without a solution."""
+    """Rates of the unstrained lengths (N, m) along `path`; NaN without a solution.
+
+    They are accurate to 1e-8 of the largest rate, and of first order in the step at the border of feasibility.
+    """
     # Geometry and tensions both change: L(t) = L(pose(t), tau(t)). The tensions of most methods depend only on the
     # pose. They are computed again shortly before and after each sample, at poses that the path's twist, twist rate and
     # jerk determine. `Closest` depends on its previous tensions. It is solved again one and two steps after each
@@ -266,13 +269,12 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
 
     now, after = state.unstrained_length, lengths(step)
     if closest:  # a backward step would cross the active limits
-        later = lengths(2.0 * step)
-        best = (4.0 * after - later - 3.0 * now) / (2.0 * step)
+        best, other = (4.0 * after - lengths(2.0 * step) - 3.0 * now) / (2.0 * step), after
     else:
-        best = (after - lengths(-step)) / (2.0 * step)
-    if np.isnan(best[kept]).any():  # at the border of feasibility, only one side has a solution
-        for one_sided in ((after - now) / step, (now - lengths(-step)) / step):
-            best = np.where(np.isnan(best), one_sided, best)
+        before = lengths(-step)
+        best, other = (after - before) / (2.0 * step), 2.0 * now - before
+    for neighbor in (after, other):  # at the border of feasibility, only one side has a solution: first order
+        best = np.where(np.isnan(best), (neighbor - now) / step, best)
     rates[kept] = best[kept]
     return locked(rates)
 

@@ -199,7 +199,7 @@ class _Robust(YamlEntry):
 
     def errors(self) -> AnchorErrors:
         """Sample of anchor errors."""
-        return AnchorErrors(**self.model_dump() | self.given())
+        return AnchorErrors(self.si("deviation"), samples=self.samples, take=self.take, seed=self.seed)
 
 
 class _Design(YamlEntry):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final, TypeAlias
+from typing import Any, ClassVar, Final, TypeAlias
 
 import numpy as np
 
@@ -80,9 +80,9 @@ def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Ar
         *(results[tables.SPAN], results[tables.RISE], cables[..., tables.DENSITY], cables[..., tables.STIFFNESS]),
         *(length, results[tables.HORIZONTAL], results[tables.VERTICAL], results[tables.TENSION]),
     )
-    a, b, c, d, e, f, g, h = (locked(np.ascontiguousarray(row).reshape(-1)) for row in rows)
+    columns: Any = tuple(locked(np.ascontiguousarray(row).reshape(-1)) for row in rows)
     out = np.empty(length.size)
-    largest_sags(model.terms(gravity), (a, b, c, d, e, f, g, h), out)
+    largest_sags(model.terms(gravity), columns, out)
     return out.reshape(length.shape)
 
 

@@ -80,8 +80,8 @@ class Design:
     platform: Array = field(converter=given)
     mass: float = field(converter=float)
     rope: str = "dyneema-sk78"
-    diameter: float = 0.006
-    cables: int = 8
+    diameter: float = field(default=0.006, converter=float)
+    cables: int = field(default=8, converter=int)
     layout: str = "top"
 
     def __attrs_post_init__(self) -> None:

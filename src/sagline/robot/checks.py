@@ -86,6 +86,7 @@ def cables(given: Cable, count: int) -> Cable:
     fields = {name: per_cable(field, f"cables: {name}", count) for name, field in given.known().items()}
     step = "Give the mass per length of the cable; to neglect its weight, use the model Elastic or Straight."
     density = fields["linear_density"]
+    # np.abs prints -0 as 0
     refuse_first(density == 0.0, "cables: linear_density", np.abs(density), "kg/m", "> 0 kg/m", step)
     return given if given.linear_density.shape == (count,) else given.replace(**fields)
 

@@ -266,7 +266,7 @@ def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
             refuse_first(array > LARGEST_PULLEY, item, array, "m", allowed, step)
         case "gear":
             step = "Give the encoder turns per drum turn; negative if counts decrease when cable is paid out."
-            refuse_first(array == 0.0, item, np.abs(array), "", "not 0", step)
+            refuse_first(array == 0.0, item, np.abs(array), "", "not 0", step)  # np.abs prints -0 as 0
     return array
 
 

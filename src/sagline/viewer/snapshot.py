@@ -78,7 +78,7 @@ METHODS: Final = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Changes of the robot, and settings of its solution and drawing."""
+    """Changes of the robot, and settings of its solution and drawing. The controls of the panel keep the ranges."""
 
     mass: float  # mass of the platform with its load [kg], > 0; the inertia is proportional to it
     density: float = 1.0  # factor on the cables' linear density, > 0

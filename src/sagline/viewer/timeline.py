@@ -230,7 +230,7 @@ def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, fl
     """Lowest and highest value of the axis, and the limits within this range."""
     lows, highs = (np.concatenate([part[k].ravel() for part in parts]) for k in (1, 2))
     lows, highs = lows[np.isfinite(lows)], highs[np.isfinite(highs)]
-    low, high = (float(lows.min()), float(highs.max())) if lows.size else (0.0, 1.0)
+    low, high = (float(lows.min()), float(highs.max())) if lows.size and highs.size else (0.0, 1.0)
     spread = max(high - low, 1e-6 * max(abs(high), 1.0))
     limits = [limit for chart in charts for limit in chart.limits]
     near = [limit for limit in limits if low - _NEAR * spread <= limit[0] <= high + _NEAR * spread]

@@ -18,8 +18,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
-from sagline.kernels.dynamics import chains
-from sagline.kernels.dynamics import chains as ends
+from sagline.kernels.dynamics import chains as run
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.progress import COUNTERS, FAILED
@@ -105,7 +104,7 @@ class ChainPlant(Plant):
         nodes: Elements per cable at the start.
     """
 
-    kernel: ClassVar[Any] = staticmethod(chains.run_chains)
+    kernel: ClassVar[Any] = staticmethod(run.run_chains)
     cable_mass: ClassVar[str] = "lumped"
 
     def __init__(self, given: InitialConditions, data: Array, nodes: int, losses: Damping) -> None:
@@ -148,8 +147,8 @@ class ChainPlant(Plant):
     def arguments(self, rules: Any, numbers: Any, inputs: Any) -> Any:
         """Arguments of the kernel of chains, in the order of `Plant.arguments`."""
         lengths: TimeTable = inputs[0]
-        if self._work.size != chains.ROOM + 2 * lengths.value.shape[1]:
-            self._work = np.zeros(chains.ROOM + 2 * lengths.value.shape[1])
+        if self._work.size != run.ROOM + 2 * lengths.value.shape[1]:
+            self._work = np.zeros(run.ROOM + 2 * lengths.value.shape[1])
         ends = self._table.copy()
         ends[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1] = self._carrier.levers(self._ends)[self.cables]
         freedom = self.robot.freedom
@@ -200,12 +199,12 @@ class ChainPlant(Plant):
 
     def failure(self, time: float, step: float) -> InvalidValueError:
         """Create the error for a kernel that stopped at `time` [s]. It explains the cause."""
-        cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[ends.ENDED]
-        if how == ends.GROWN:
+        cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[run.ENDED]
+        if how == run.GROWN:
             return super().failure(time, step)
-        value = f"{'too long' if how == ends.LONG else 'almost completely wound in'} at {time:.6g} s"
+        value = f"{'too long' if how == run.LONG else 'almost completely wound in'} at {time:.6g} s"
         element = self._chains[0][int(self.counters[FAILED]) - 1, c.ELEMENT]
-        low, high = (ends.FEWEST + 1) * element, self._chains[1].shape[2] * element
+        low, high = (run.FEWEST + 1) * element, self._chains[1].shape[2] * element
         advice = 'Correct the lengths, give more nodes, or cable_mass="none".'
         return InvalidValueError(f"cable {cable}: length", value, f"{low:.3g} to {high:.3g} m of its chain", advice)
 
