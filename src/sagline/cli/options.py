@@ -102,12 +102,14 @@ def option(metavar: str, text: str, *names: str) -> Any:
     return typer.Option(*names, metavar=metavar, help=text)
 
 
-def converted(metavar: str, text: str, function: str, *names: str, **arguments: object) -> Any:
-    """An option whose text a function of `sagline.cli.values` converts to the value."""
+def converted(metavar: str, text: str, function: str | Callable[..., Any], *names: str, **arguments: object) -> Any:
+    """An option whose text a function converts to the value; a name is that of a function of `sagline.cli.values`."""
 
     def convert(parameter: typer.CallbackParam, value: Any) -> Any:
         if not isinstance(value, str):
             return value  # the default value
+        if callable(function):
+            return function(value, parameter.opts[-1], **arguments)
         from sagline.cli import values
 
         return getattr(values, function)(value, parameter.opts[-1], **arguments)
@@ -267,14 +269,14 @@ SeedOption = Annotated[
     converted(
         "NUMBER",
         "Seed of the random numbers; the same seed gives the same numbers.",
-        "whole_of",
+        whole_of,
         least=0,
         most=2**63 - 1,
     ),
 ]
 HostOption = Annotated[str, option("ADDRESS", "Address to listen on; 0.0.0.0 and :: mean all addresses.")]
 PortOption = Annotated[
-    int, converted("NUMBER", "Port to listen on; 0 selects a free port.", "whole_of", least=0, most=65535)
+    int, converted("NUMBER", "Port to listen on; 0 selects a free port.", whole_of, least=0, most=65535)
 ]
 TrueOption = Annotated[
     str | None,

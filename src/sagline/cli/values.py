@@ -9,7 +9,6 @@ from typing import Any, Final, cast
 import numpy as np
 
 import sagline as sl
-from sagline.cli.options import whole_of as whole_of
 from sagline.core.arrays import FARTHEST, checked
 from sagline.core.errors import InvalidValueError
 from sagline.files.pose_text import pose_of_text as pose_of_text

@@ -93,7 +93,7 @@ def view(
     ] = True,
     clients: Annotated[
         int,
-        opt.converted("NUMBER", "Largest number of pages open at the same time.", "whole_of", least=1, most=1000),
+        opt.converted("NUMBER", "Largest number of pages open at the same time.", opt.whole_of, least=1, most=1000),
     ] = 32,
     allow_host: _AllowHostOption = None,
     browser: Annotated[bool, opt.flag("Open the page in a browser on this machine.", "--browser/--no-browser")] = True,
