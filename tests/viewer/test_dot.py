@@ -166,6 +166,17 @@ def test_steps_add_up_and_stop_at_the_limits() -> None:
         assert np.linalg.norm(back.tension - snapshot.tension) > 0.015 * size  # it does not stick to the side
 
 
+def test_one_redundant_cable_has_one_coordinate() -> None:
+    robot = sl.load_robot("falcon-7")
+    with contextmanager(shown)(lambda server: Page(server, FEATURES, robot)) as page, Client(page.url) as client:
+        field = dot_field_of(seen(page))
+        assert field is not None
+        size = float(np.max(field.high - field.low))
+        start = moved(page, client, {"at": [float(field.polygon.vertices.mean())]})
+        snapshot = moved(page, client, {"by": [0.01, 0.0]})
+        assert field.polygon.basis @ (snapshot.tension - start.tension) == pytest.approx([0.01 * size], rel=1e-6)
+
+
 def test_a_drag_keeps_the_nearest_tensions_to_the_chosen_ones(page: Shown) -> None:
     with Client(page.url) as client:
         chosen = moved(page, client, {"at": [150.0, 80.0]}).tension

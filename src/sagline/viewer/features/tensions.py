@@ -355,12 +355,12 @@ class TensionsFeature(Feature):
         field = self._field
         if field is None or not isinstance(value, dict):
             return
-        at, by = (finite_numbers(value.get(name), 2, FARTHEST_AIM) for name in ("at", "by"))
-        at, by = (None if place is None else place[: field.redundant] for place in (at, by))
+        at = finite_numbers(value.get("at"), field.redundant, FARTHEST_AIM)
+        by = finite_numbers(value.get("by"), 2, FARTHEST_AIM)  # the page sends steps in both directions
         if at is None:
             if by is None or self._aim is None or not np.isfinite(self._aim).all():
                 return
-            at = self._aim + np.clip(by, -FARTHEST, FARTHEST) * float(np.max(field.high - field.low))
+            at = self._aim + np.clip(by[: field.redundant], -FARTHEST, FARTHEST) * float(np.max(field.high - field.low))
         self._aim = field.nearest(at)
         self._panel.choose_by_hand(ByHand(target=field.tension(self._aim + self._beyond(field, at - self._aim))))
 
