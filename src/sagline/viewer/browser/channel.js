@@ -20,6 +20,7 @@
   const topics = new Map(); // topics by the uuid of their elements
   const numbers = new Map(); // labels of hidden numbers by their uuid
   const unsent = new Map(); // last unsent message of each topic
+  const early = new Map(); // last unsent value of each hidden number, by label
   let count = 0;
   let worker, uuid; // worker that connects the client to its server; uuid of the field for messages of the page
 
@@ -29,6 +30,8 @@
     worker.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
   const flush = () => {
     if (!welcome || uuid === undefined) return;
+    for (const [of, label] of numbers) if (early.has(label)) post(of, early.get(label));
+    early.clear();
     unsent.forEach((value) => post(uuid, value));
     unsent.clear();
   };
@@ -45,9 +48,10 @@
       unsent.set(topic, text);
       flush();
     },
-    // Set a hidden number.
+    // Set a hidden number; before the connection is open, only the last value is kept.
     set(label, value) {
-      for (const [of, name] of numbers) if (name === label && welcome) post(of, value);
+      early.set(label, value);
+      flush();
       deliver(`number ${label}`, value);
     },
     // Handle the values of a topic, starting with the last one that has arrived.
