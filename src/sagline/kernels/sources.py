@@ -56,9 +56,8 @@ def is_whole(content: bytes) -> bool:
 def sources_of(module: str, sources: Path) -> frozenset[Path]:
     """Source files below the folder of the kernels on which the machine code of `module` depends."""
     if not sources.joinpath(*module.split(".")).with_suffix(".py").is_file():
-        return frozenset(
-            sources.rglob("*.py")
-        )  # a kernel outside the folder, such as a benchmark, may call all kernels
+        # a kernel outside the folder, such as a benchmark, may call all kernels
+        return frozenset(sources.rglob("*.py"))
     waiting, found = {module, "with_numba"}, set[Path]()
     while waiting:
         name = waiting.pop()

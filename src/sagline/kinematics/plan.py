@@ -269,12 +269,14 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
 
     now, after = state.unstrained_length, lengths(step)
     if closest:  # a backward step would cross the active limits
-        best, other = (4.0 * after - lengths(2.0 * step) - 3.0 * now) / (2.0 * step), after
+        best = (4.0 * after - lengths(2.0 * step) - 3.0 * now) / (2.0 * step)
+        one_sided = [after - now]
     else:
         before = lengths(-step)
-        best, other = (after - before) / (2.0 * step), 2.0 * now - before
-    for neighbor in (after, other):  # at the border of feasibility, only one side has a solution: first order
-        best = np.where(np.isnan(best), (neighbor - now) / step, best)
+        best = (after - before) / (2.0 * step)
+        one_sided = [after - now, now - before]
+    for change in one_sided:  # at the border of feasibility, only one side has a solution: first order
+        best = np.where(np.isnan(best), change / step, best)
     rates[kept] = best[kept]
     return locked(rates)
 
