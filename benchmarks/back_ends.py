@@ -60,7 +60,7 @@ def rows() -> Iterator[Row]:
         with recorded() as calls:
             job()
         call, function = longest(calls, entry), functions()[entry]
-        compiled = library.entry(function)
+        compiled = library.entry(function.__name__, function.__module__)
         assert compiled is not None
         by_numba = getattr(__import__(function.__module__, fromlist=[entry]), entry)
         best = {compiled: float("inf"), by_numba: float("inf")}

@@ -37,7 +37,8 @@ from benchmarks.measure import (
 )
 from benchmarks.sweep import sweeps
 from sagline.core.arrays import Array, locked
-from sagline.kernels.cable.batch import BUFFERS, CHUNK, batch_from_length, batch_from_tension
+from sagline.kernels.cable.batch import batch_from_length, batch_from_tension
+from sagline.kernels.tables import BUFFERS, CHUNK
 from tests.cables.reference import load_reference
 from tests.kinematics.test_underconstrained import places, suspended
 
@@ -99,6 +100,17 @@ def speed_of_cables() -> Iterator[Row]:
             yield Row(
                 "catenary from tension, strains up to 5 %", "<= 1.3 x", f"{strained:.0f} ns, {strained / bare:.2f} x"
             )
+    solver = sl.CableSolver(CABLE)
+    single = [
+        best_of_calls(call) * 1e6
+        for call in (
+            lambda: solver.from_tension(12.0, -4.0, 100.0),
+            lambda: solver.from_length(12.0, -4.0, 12.7),
+            lambda: model.from_tension(CABLE, 12.0, -4.0, 100.0),
+        )
+    ]
+    row = f"{single[0]:.1f} us; {single[1]:.1f} us; {single[2]:.0f} us"
+    yield Row("CableSolver.from_tension; .from_length; the same by Catenary.from_tension", "<= 2 us; <= 2 us", row)
     yield Row("the article's formula (48), 10^6 cables", "", f"as printed {printed:.0f} ns, algebraic {plain:.1f} ns")
 
 
@@ -134,6 +146,14 @@ def inverse_kinematics() -> Iterator[Row]:
         there = in_the_box(other, POSES // 5)
         time = best_seconds(partial(sl.inverse, other, there), 5) * 1e6 / len(there)
         yield Row(f"the same, {name}", "", f"{time:.1f} us")
+    ratios = []
+    for name in ("article-suspended", "article-mixed", "cogiro", "ipanema-1", "ipanema-3"):
+        other = sl.load_robot(name)
+        run = partial(sl.inverse, other, in_the_box(other, POSES // 2))
+        pairs = [[best_seconds(partial(run, stability=asked), 1) for asked in (True, False)] for _ in range(15)]
+        ratios.append(np.divide(*np.min(pairs, axis=0)))
+    listed = ", ".join(f"{ratio:.2f}" for ratio in ratios)
+    yield Row("inverse with stability, relative to stability=False, in turn; five presets", "<= 1.1 x", f"{listed} x")
     plan = sl.inverse(robot, pose)
     residual = float(np.max(plan.wrench_residual))
     some = slice(10_000)

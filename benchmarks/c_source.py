@@ -13,7 +13,7 @@ from rich.console import Console
 
 import sagline as sl
 from benchmarks.measure import Row, one_core, show
-from sagline.tension.methods import METHODS
+from sagline.tension.methods import methods_by_name
 from tests.files.c_programs import arm_sizes, compiled
 
 # best of many runs over 256 poses; forward from 1 cm away
@@ -60,7 +60,7 @@ int main(void)
     return sum != 0;
 }
 """
-EVERY: Final = [make() for make in METHODS.values()]
+EVERY: Final = [make() for make in methods_by_name().values()]
 CASES: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
     ("inverse", "article-prototype", {}),
     ("inverse, forward", "article-prototype", {"forward": True}),

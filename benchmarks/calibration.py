@@ -149,7 +149,7 @@ def poses() -> Iterator[Row]:
         )
 
 
-PARTS = (single, accuracy, large, poses)
+PARTS = (large, single, accuracy, poses)  # first the part that reads the largest memory of the process
 
 if __name__ == "__main__":
     print_table("Calibration", PARTS)

@@ -90,7 +90,7 @@ def main() -> None:
         set_priority(given.priority)
     robot, home = sl.load_robot("article-prototype"), sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)
     pace = NotedPace()
-    with machine_in_process(robot, robot, home) as machine, closing(sl.plc.S7Link(machine.addresses, robot)) as link:
+    with machine_in_process(robot, robot, home) as (addresses, _), closing(sl.plc.S7Link(addresses, robot)) as link:
         control = sl.control.Controller(robot, link, pace=pace, seed=1)
         gc.collect()
         gc.freeze()  # as in `sagline control`

@@ -59,15 +59,24 @@ def process_peak_memory(code: str) -> float:
     return float(done.stdout.split()[-1]) * 1024 / 1e9
 
 
-def show(title: str, rows: Sequence[Row], console: Console) -> None:
+class Compared(NamedTuple):
+    """One line of a table that compares two programs."""
+
+    quantity: str
+    authors: str
+    sagline: str
+
+
+def show(title: str, rows: Sequence[Row | Compared], console: Console) -> None:
     """Print a table, as Markdown if the output is not a terminal."""
+    names = rows[0]._fields if rows else Row._fields
     if console.is_terminal:
-        table = Table(*Row._fields, title=title)
+        table = Table(*names, title=title)
         for row in rows:
             table.add_row(*row)
         console.print(table)
         return
-    print(f"\n### {title}\n\n| {' | '.join(Row._fields)} |\n|---|---|---|")
+    print(f"\n### {title}\n\n| {' | '.join(names)} |\n|---|---|---|")
     for row in rows:
         print(f"| {' | '.join(row)} |")
 

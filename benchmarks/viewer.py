@@ -52,8 +52,8 @@ def used(pid: int) -> float:
 
 
 def cables_in(message: dict[str, Any]) -> bool:
-    """True if a message moves the cables."""
-    return message.get("name") == "/cables" and "points" in message.get("updates", {})
+    """True if a message creates or moves the cables."""
+    return message.get("name") == "/cables" and "points" in message.get("updates", message.get("props", {}))
 
 
 def first_cables() -> Iterator[Row]:
@@ -170,7 +170,7 @@ def cut_cables() -> Iterator[Row]:
                 next(message for message in client.heard(60.0) if platform_in(message))
                 waits.append(time.perf_counter() - told)
                 spent.append(processor() - before)
-                client.set(buttons["Calm"], True)
+                client.set(buttons["Undo cut"], True)
                 for _ in client.heard(QUIET):
                     pass
         reached = f"{min(waits):.2f} s; {min(spent):.2f} s of processor"

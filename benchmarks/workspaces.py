@@ -121,6 +121,31 @@ def margins() -> Iterator[Row]:
         )
 
 
+def many_cables() -> Iterator[Row]:
+    """Margins of suspended robots with 8 to 16 cables, and the inverse in the same run."""
+    for cables, reach in ((8, "none"), (10, "none"), (12, "none"), (16, "<= 40 us per pose")):
+        rng = np.random.default_rng(cables)
+        robot = sl.Robot(
+            "suspended",
+            rng.uniform((-6.0, -4.0, 4.0), (6.0, 4.0, 6.0), (cables, 3)),
+            rng.uniform(-0.5, 0.5, (cables, 3)),
+            sl.Cable(0.1, 1e6),
+            100.0,
+            np.eye(3) * 10.0,
+            tension_min=10.0,
+            tension_max=2000.0,
+        )
+        poses = sl.Pose.from_euler(
+            rng.uniform((-3.0, -2.0, 0.0), (3.0, 2.0, 2.0), (40, 3)), *rng.uniform(-0.1, 0.1, (3, 40))
+        )
+        prepared, rows = MarginRows(robot), pose_rows(poses)
+        own = best_seconds(partial(prepared.rows, rows), 200) * 1e6 / 40
+        known = best_seconds(partial(sl.inverse, robot, poses, tension=sl.MinimumNorm()), 20) * 1e6 / 40
+        yield Row(
+            f"signed margin, suspended, {cables} cables", reach, f"{own:.1f} us ({own / known:.2f} of the inverse)"
+        )
+
+
 def calls() -> Iterator[Row]:
     """One pose per call, and many robots in one call."""
     robot = sl.load_robot("article-suspended")
@@ -141,7 +166,7 @@ def calls() -> Iterator[Row]:
     yield Row("600 robots at 315 poses, in one call", "no object a robot", f"{best_seconds(run, 3):.2f} s")
 
 
-PARTS = (margins, calls, hulls, volumes, frames, proofs)
+PARTS = (margins, many_cables, calls, hulls, volumes, frames, proofs)
 
 if __name__ == "__main__":
     print_table("Workspace", PARTS)

@@ -28,6 +28,6 @@ for position, quaternion, wrench in zip(
     wound.append(lengths.copy())
 plan = sl.inverse(robot, path)  # the same lengths from a single call
 difference = np.abs(np.array(wound) - plan.unstrained_length).max()
-print(f"{len(path)} set points; the planner's lengths to {difference:.0e} m")
-print(f"{1e6 * np.median(times):.1f} µs a pose, median")
+print(f"{len(path)} set points, within {difference:.0e} m of the plan")
+print(f"{1e6 * np.median(times):.1f} µs per pose, median")
 sl.plot.save(sl.plot.lengths(plan), "control_loop.png")

@@ -19,7 +19,7 @@ found = sl.forward(
 error = np.linalg.norm(found.pose.position - plan.state.pose.position, axis=1)
 print(f"{found.solved.sum()} of {len(error)} samples found")
 print(
-    f"1 mm of noise per cable is {1e3 * error.mean():.1f} mm of position,",
+    f"1 mm of noise per cable: position error {1e3 * error.mean():.1f} mm,",
     f"{1e3 * error.max():.1f} mm at most",
 )
 figure = Figure(figsize=(6.0, 3.0), layout="constrained")

@@ -19,9 +19,9 @@ robot = sl.Robot(
 first, last = np.array([4.0, 4.0, 4.0]), np.array([3.6, 4.1, 4.1])
 start, goal = sl.forward(robot, first), sl.forward(robot, last)
 _, aside, height = goal.pose.position - start.pose.position
-print(f"it moves {aside:.2f} m aside and {height:.2f} m up")
+print(f"the load moves {aside:.2f} m aside and {height:.2f} m up")
 swing = sl.modes(goal.state).frequency[:2]
-print(f"it vibrates at {swing.round(2)} Hz, massless cables")
+print(f"the load vibrates at {swing.round(2)} Hz, massless cables")
 
 # x of this path is the completed share of the change of lengths
 share = sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=0.8, rate=1000.0)

@@ -25,7 +25,7 @@ def instead_of_machines(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("sagline.twin.server.Server.run", served)
     monkeypatch.setattr("sagline.cli.control._link", lambda robot, *_, **__: sl.twin.Machine(robot).link())
-    for name in ("article.experiment.in_process", "cli.article.apart_over_s7", "cli.article._tell"):
+    for name in ("article.experiment.in_process", "cli.article._apart_over_s7", "cli.article._tell"):
         monkeypatch.setattr(f"sagline.{name}", lambda *_, **__: SimpleNamespace())
     monkeypatch.setattr("sagline.article.experiment_page.experiment_chapter", lambda *_: SimpleNamespace(findings=()))
     monkeypatch.setattr("sagline.article.experiment_page.write_experiment", lambda result, folder, how: folder)

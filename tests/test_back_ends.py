@@ -87,7 +87,7 @@ def test_both_builds_give_the_same_numbers() -> None:
             if call.symbol.startswith(f"sagline_{name}_poses"):
                 results = [copied(call.before) for _ in builds]
                 for build, arguments in zip(builds, results, strict=True):
-                    cast("Any", build.entry(function))(*arguments)
+                    cast("Any", build.entry(function.__name__, function.__module__))(*arguments)
                 assert repr(results[0]) == repr(results[1])
                 compared += 1
     assert compared >= 2

@@ -150,7 +150,7 @@ def test_values_of_rounding_are_printed_as_rounding() -> None:
         (0.0004, 0.0196, "m", "0 ± 20 mm"),
         (1.0, 0.0995, "", "1.00 ± 0.10"),  # 0.0995 is printed as 0.10 with two digits
         (1.0, 3456.0, "s", "0 ± 3,500 s"),
-        (5.0, float("inf"), "kg", "5 kg, not told"),
+        (5.0, float("inf"), "kg", "5 kg ± unknown"),
         (5.0, 0.0, "kg", "5 kg ± 0"),
     ],
 )

@@ -198,6 +198,18 @@ def _cables(given: _Given) -> dict[str, Call]:
             sl.Elastic().profile, _all(cable=one, state=("one", given.hung), points=("whole", 5))
         ),
         "CableModel.terms": Call(sl.Catenary().terms, _all(gravity=gravity)),
+        "CableSolver": Call(
+            lambda **a: (sl.CableSolver(**a), None)[1],
+            _all(cable=one, model=("one", sl.Catenary(), True), gravity=gravity),
+        ),
+        "CableSolver.from_tension": Call(
+            sl.CableSolver(given.cable).from_tension,
+            _all(span=("number", 12.5), rise=("number", -4.5), chord_tension=("number", 100.5)),
+        ),
+        "CableSolver.from_length": Call(
+            sl.CableSolver(given.cable).from_length,
+            _all(span=("number", 12.5), rise=("number", -4.5), unstrained_length=("number", 13.5)),
+        ),
         "CableState.__getitem__": Call(given.hung.__getitem__, _all(index=("index", 0))),
         "CableState.points": Call(given.hung.points, _all(count=("whole", 5))),
         "Empirical": Call(sl.Empirical, _all(k_h=("number", 4.75), k_p=("number", 4.5))),
@@ -885,8 +897,10 @@ def _logs(given: _Given) -> dict[str, Call]:
         "source": ("text", "a table"),
     }
     log = sl.WinchLog(unstrained_length=lengths, load_cells=cells, sensors=sensors)
-    file = given.folder / "winches.csv"
+    still = sl.WinchLog(unstrained_length=np.ones((30, 3)), time=np.arange(0.0, 3.0, 0.1))
+    file, columns = given.folder / "winches.csv", given.folder / "columns.yaml"
     log.save(file)
+    columns.write_text('columns: {length: "length_{}", load_cell: "load_cell_{}"}')
     return {
         "WinchLog": Call(sl.WinchLog, _all(unstrained_length=("array", lengths), **fields)),
         "WinchLog: counts": Call(sl.WinchLog, _all(counts=("array", lengths))),
@@ -894,8 +908,12 @@ def _logs(given: _Given) -> dict[str, Call]:
             log.replace, _all(**{name: fields[name] for name in ("load_cells", "time", "source")})
         ),
         "WinchLog.rows": Call(log.rows, _all(which=("index", 0))),
+        "WinchLog.at_rest": Call(still.at_rest, _all(duration=("number", 1.0))),
         "WinchLog.save": Call(log.save, _all(file=("file", str(given.folder / "saved.csv")))),
-        "load_log": Call(sl.load_log, _all(file=("file", str(file)), sensors=("one", sensors, True))),
+        "load_log": Call(
+            sl.load_log,
+            _all(file=("file", str(file)), sensors=("one", sensors, True), columns=("file", str(columns), True)),
+        ),
     }
 
 
@@ -1316,7 +1334,7 @@ def _in_time(given: _Given) -> dict[str, Call]:
         ),
         "Simulator.release": Call(lambda winches: machine.release(winches), _all(winches=("cable", 3))),
         "SecondOrder": Call(sl.SecondOrder, _all(bandwidth=("number", 10.0), damping_ratio=("number", 0.75))),
-        "Break": Call(sl.Break, _all(cable=("whole", 3), time=("number", 0.5))),
+        "Break": Call(sl.Break, _all(cable=("whole", 3), time=("number", 0.5), position=("number", 0.5))),
         "Stall": Call(sl.Stall, _all(winch=("whole", 3), time=("number", 0.5))),
         "Brake": Call(sl.Brake, _all(time=("number", 0.5), winch=("whole", 3, True), duration=("number", 0.25))),
         "Drop": Call(sl.Drop, _all(mass=("number", 3.0), time=("number", 0.5))),

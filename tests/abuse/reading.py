@@ -166,6 +166,23 @@ def _caspr_beside(other: str, text: str) -> Callable[[Path], Any]:
     return read
 
 
+COLUMNS = """\
+columns:
+  time: {name: t, unit: ms}
+  length: {name: "l{}", unit: mm, scale: -1, cables: [2, 1]}
+  load_cell_1: force
+length_deviation: 0.5 mm
+tension_deviation: 5 N
+frame: {position: [1, 0, 0.5], euler: {alpha: 90 deg}}
+"""
+
+
+def _log_with_columns(file: Path) -> Any:
+    other = file.parent / "other.csv"
+    other.write_text("t,l1,l2,force,note\n0,-2500,-2600,40,a\n1,-2400,-2700,,b\n")
+    return sl.load_log(other, columns=file)
+
+
 READERS: Final = (
     Reader("robot.yaml", ROBOT, sl.load_robot),
     Reader("tour.yaml", WAYPOINTS, sl.load_path),
@@ -174,6 +191,7 @@ READERS: Final = (
     Reader("counts.csv", COUNTS, lambda file: load_readings(file, "count", 4)),
     Reader("cable.csv", MEASURED, sl.load_measurements),
     Reader("winches.csv", LOG, sl.load_log),
+    Reader("columns.yaml", COLUMNS, _log_with_columns),
     Reader("shelf.wcrfx", WIREX, sl.load_wirex),
     Reader("gondola_bodies.xml", CASPR_BODIES, _caspr_beside("gondola_cables.xml", CASPR_CABLES)),
     Reader("gondola_cables.xml", CASPR_CABLES, _caspr_beside("gondola_bodies.xml", CASPR_BODIES)),

@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import sagline as sl
-from sagline.cli.installation import example_files
+from sagline.cli.installation import _example_files
 from sagline.cli.main import app
 from sagline.plc.wire import addresses_of, groups_at
 from sagline.present.page import Chapter
@@ -42,7 +42,7 @@ ANSWERS = "\n" * 40  # answers to the questions of `new`: its suggestions
 def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the example files, a run, and invalid files."""
     folder = tmp_path_factory.mktemp("stocked")
-    for file in example_files():
+    for file in _example_files():
         if file.suffix != ".py":
             shutil.copy(file, folder)
     (folder / "short.yaml").write_text(SHORT)

@@ -18,7 +18,7 @@ import sagline as sl
 from sagline.files.execution_file import save_execution
 from sagline.present.page import Chapter, Finding, Panel, Table, Verdict, page
 from sagline.robot.tolerances import Provenance
-from sagline.share.course import of_plan, of_session
+from sagline.share.course import SharedMotion
 from sagline.share.page import course_page, robot_page
 from sagline.viewer.page import Source
 from sagline.viewer.server import page_html
@@ -146,9 +146,11 @@ def test_reports(text: str) -> None:
 @pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
 def test_shared_pages(text: str, tmp_path: Path) -> None:
     check(lambda name: robot_page(named(name)), text)
-    check(lambda name: course_page(of_plan(sl.inverse(named(name), sl.article_path(rate=1.0))), name), text)
-    check(lambda name: course_page(of_session(session(name, tmp_path)), name), text)
-    course = of_plan(sl.inverse(named("a"), sl.article_path(rate=1.0)))
+    check(
+        lambda name: course_page(SharedMotion.of_plan(sl.inverse(named(name), sl.article_path(rate=1.0))), name), text
+    )
+    check(lambda name: course_page(SharedMotion.of_session(session(name, tmp_path)), name), text)
+    course = SharedMotion.of_plan(sl.inverse(named("a"), sl.article_path(rate=1.0)))
     texts = ("kind", "quantity", "notes", "verdicts")
     check(
         lambda name: course_page(replace(course, **{one: filled(getattr(course, one), name) for one in texts}), "b"),

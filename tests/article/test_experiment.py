@@ -178,9 +178,9 @@ def test_the_loop_removes_zero_errors_from_tensions_without_motion() -> None:
 
 @pytest.mark.soak
 def test_the_experiment_runs_over_s7_in_real_time() -> None:
-    from sagline.cli.article import apart_over_s7
+    from sagline.cli.article import _apart_over_s7
 
     begun = time.perf_counter()
-    found = apart_over_s7(ROBOT, ROBOT, 1, lambda share: None)
+    found = _apart_over_s7(ROBOT, ROBOT, 1, lambda share: None)
     assert (time.perf_counter() - begun) / 60.0 == pytest.approx(13.9, abs=0.6)
     assert found.distance.max() <= 0.05e-3

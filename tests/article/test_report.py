@@ -287,7 +287,7 @@ def test_the_same_report_has_the_same_bytes(tmp_path: Path) -> None:
     ],
 )
 def test_names_of_chapters_are_accepted(words: list[str], keys: list[str]) -> None:
-    assert [part.key for part in selection(words).parts] == keys
+    assert [part.key for part in selection(words)[0]] == keys
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def example_truth() -> Truth:
         mass=round(robot.mass, 2),
         center_of_mass=robot.center_of_mass.round(4),
         tolerances={},
-        notes="What winches.csv was read from: the drawing, with errors.",
+        notes="True robot of the readings in winches.csv: the drawing with errors.",
     )
     return truth._replace(robot=rounded)
 

@@ -144,10 +144,16 @@ def at_rest(twin: Twin, place: Array) -> Array | None:
 
 def log_of_twin(twin: Twin, seed: int, poses: int = POSES) -> sl.WinchLog:
     """Readings of lengths and load cells at places of the workspace with noise, and the commanded poses."""
+    return log_with_inclinations(twin, seed, poses)[0]
+
+
+def log_with_inclinations(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl.WinchLog, Array]:
+    """The log of `log_of_twin`, and yaw, pitch and roll of the twin (N, 3) [rad]."""
     rng = np.random.default_rng((seed, 1))
     lengths: list[Array] = []
     cells: list[Array] = []
     stood: list[Array] = []
+    turned: list[Array] = []
     while len(stood) < poses:
         place = rng.uniform([-0.7, -0.5, 0.4, -0.04], [0.7, 0.5, 1.7, 0.04])
         found = at_rest(twin, place)
@@ -159,11 +165,13 @@ def log_of_twin(twin: Twin, seed: int, poses: int = POSES) -> sl.WinchLog:
         lengths.append(found[2:6] - twin.zeros + LENGTH_NOISE * rng.normal(size=4))
         cells.append(twin.gain * tension + twin.bias + CELL_NOISE * rng.normal(size=4))
         angles = np.array([place[3], found[1], found[0]])
+        turned.append(angles)
         stood.append(np.concatenate((place[:3] + 0.02 * rng.normal(size=3), angles + 0.01 * rng.normal(size=3))))
     placed = np.array(stood)
-    return sl.WinchLog(
+    log = sl.WinchLog(
         unstrained_length=np.array(lengths),
         load_cells=np.array(cells),
         commanded=sl.Pose(placed[:, :3], Rotation.from_euler("ZYX", placed[:, 3:])),
         sensors=sl.Sensors(LENGTH_NOISE, CELL_NOISE),
     )
+    return log, np.array(turned)

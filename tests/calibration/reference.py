@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -30,6 +30,7 @@ STEPS = {
     kinds.SHIFT: 1e-2,
     kinds.TURN: 1e-3,
     kinds.TARGET: 1e-2,
+    kinds.SCALE: 1e-5,
 }
 FIRST = tuple(STEPS)  # first row of each kind
 _WINCH = {kinds.RADIUS: "pulley_radius", kinds.DEAD: "dead_cable", kinds.GAIN: "load_cell_gain"}
@@ -38,11 +39,12 @@ _WINCH |= {kinds.BIAS: "load_cell_bias", kinds.ZERO: "length_zero", kinds.DRUM: 
 
 @dataclass(frozen=True)
 class Machine:
-    """A robot with its sensors; `offset` is the error of the lengths if no counts are read, (m,)."""
+    """A robot with its sensors; `offset` and `scale` are errors of the lengths if no counts are read, (m,)."""
 
     robot: sl.Robot
     sensors: sl.Sensors
     offset: Array
+    scale: Array | float = 1.0
 
     @property
     def counting(self) -> bool:
@@ -53,18 +55,20 @@ class Machine:
     def believed(self, lengths: Array) -> Array:
         """Counts before rounding, or measured lengths, at true lengths (N, m)."""
         if not self.counting:
-            return lengths - self.offset
+            return (lengths - self.offset) / self.scale
         return counts_of(self.robot, lengths)
 
     def lengths(self, believed: Array) -> Array:
         """True lengths (N, m) of counts or lengths."""
         if not self.counting:
-            return believed + self.offset
+            return self.scale * believed + self.offset
         return sl.lengths_from_counts(self.robot, believed)
 
     def changed(self, row: int, cable: int, by: float) -> Machine:
         """The machine with a changed parameter of `kinds`; the change is relative for parameters with a logarithm."""
         robot, sensors, winches = self.robot, self.sensors, self.robot.winches
+        if row == kinds.SCALE:
+            return replace(self, scale=_added(self.scale * np.ones(robot.cable_count), cable, by))
         if row >= kinds.TARGET:
             return Machine(robot, sensors.replace(target=_added(sensors.target, row - kinds.TARGET, by)), self.offset)
         if row >= kinds.TURN:

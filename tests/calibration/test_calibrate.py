@@ -1,5 +1,6 @@
 """Calibrations of known robots: correct values and correct standard errors."""
 
+from collections.abc import Iterable
 from functools import cache
 from typing import NamedTuple
 
@@ -35,7 +36,7 @@ ALL = {  # plausible errors of the 63 parameters of a drawing
     "center_of_mass": 0.02,
 }
 SLIP = 0.02  # m
-NO_POSE = ("without a pose that explains the readings", "one at least")
+NO_POSE = ("without a pose that explains the readings", "at least one")
 
 
 def unknowns(errors: dict[str, float]) -> list[sl.Unknown]:
@@ -387,3 +388,44 @@ def test_measured_positions_that_no_axes_explain_have_an_unknown_cause() -> None
         sl.calibrate(COGIRO, log.replace(position=mixed), unknowns(ALL), folds=0)
     assert "not known" in caught.value.value
     assert "axes" not in caught.value.value
+
+
+PLANAR = np.array([[0.0, 0.0, 0.0], [2.9, 0.0, 0.0], [2.9, 0.0, 2.3], [0.0, 0.0, 2.3]])  # frame anchors [m]
+CORNERS = np.array([[-0.066, 0.0, -0.061], [0.066, 0.0, -0.061], [0.066, 0.0, 0.061], [-0.066, 0.0, 0.061]])  # [m]
+
+
+def planar_robot(frame: Array) -> sl.Robot:
+    """Planar robot with four light cables."""
+    return sl.Robot(
+        "planar",
+        frame,
+        CORNERS,
+        sl.Cable(0.007, [1.4e4] * 4),
+        1.0,
+        0.01 * np.eye(3),
+        motion_pattern="1R2T",
+        plane_normal=(0.0, 1.0, 0.0),
+        tension_min=5.0,
+    )
+
+
+@pytest.mark.parametrize("seeds", [(9, 15), pytest.param(range(20), marks=extended)])
+def test_lengths_and_positions_without_load_cells_are_sufficient(seeds: Iterable[int]) -> None:
+    """Noise of the lengths exceeds the stretch of the cables, so that cables become slack during the search."""
+    deviations, found = [], []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        truth = planar_robot(PLANAR + rng.normal(0.0, 0.03, (4, 3)) * [1.0, 0.0, 1.0])
+        places = rng.uniform((0.6, 0.0, 0.5), (2.3, 0.0, 1.8), (62, 3))
+        lengths = sl.inverse(truth, sl.Pose(places, np.eye(3))).unstrained_length - rng.normal(0.0, 0.1, 4)
+        log = sl.WinchLog(
+            unstrained_length=lengths + rng.normal(0.0, 2.3e-3, lengths.shape),
+            position=places + rng.normal(0.0, 1e-3, places.shape),
+            sensors=sl.Sensors(length_deviation=2.3e-3, position_deviation=1e-3),
+        )
+        found.append(sl.calibrate(planar_robot(PLANAR), log, folds=0))
+        moved = found[-1].robot.frame_anchors - truth.frame_anchors
+        deviations.append((moved.ravel() / found[-1].standard_error[:12])[[0, 2, 3, 5, 6, 8, 9, 11]])
+    assert np.mean([one.status is sl.CalibrationStatus.FOUND for one in found]) >= 0.95
+    assert sl.CalibrationStatus.NOT_CONVERGED not in [one.status for one in found]
+    assert np.mean(np.abs(deviations) < 2.0) >= 0.9

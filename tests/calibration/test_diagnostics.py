@@ -163,3 +163,11 @@ def test_exchanged_load_cells_without_equilibrium_are_refused() -> None:
     with refused("log", kind=sl.InvalidValueError) as caught:
         sl.calibrate(robot, log.replace(load_cells=cells), folds=0)
     assert "cables 0 and 2" in caught.value.value
+
+
+def test_a_unit_that_makes_most_cables_seem_slack_is_recognized() -> None:
+    """With load cells in kgf the screening omits 46 of 60 rows, and the remaining rows fit."""
+    robot, log = sl.load_robot(EXAMPLES / "winches_robot.yaml"), sl.load_log(EXAMPLES / "winches.csv")
+    assert log.load_cells is not None
+    with pytest.raises(sl.InvalidValueError, match="kgf"):
+        sl.calibrate(robot, log.replace(load_cells=log.load_cells / 9.80665), folds=0)

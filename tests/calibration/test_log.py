@@ -105,7 +105,6 @@ QUARTER = np.array([0.0, 0.0, np.nan, 1.0])
         ({"counts": np.ones((N, M))}, ("counts or unstrained_length", "both given")),
         ({"unstrained_length": np.ones(M)}, ("unstrained_length", "of shape (3,)", "shape (N, m)")),
         ({"unstrained_length": np.ones((N, 0))}, ("unstrained_length", "of shape (4, 0)")),
-        ({"unstrained_length": -np.ones((N, M))}, ("unstrained_length[0, 0]", "-1 m", ">= 0 m, finite")),
         ({"unstrained_length": np.full((N, M), np.inf)}, ("unstrained_length[0, 0]", "inf m")),
         ({"load_cells": np.ones((N, M + 1))}, ("load_cells", "of shape (4, 4)", "shape (4, 3)")),
         ({"load_cells": np.full((N, M), -np.inf)}, ("load_cells[0, 0]", "-inf N")),

@@ -29,7 +29,7 @@ def changed(values: Array | None, index: Any, value: float) -> Array:
     return copied
 
 
-def left_out(log: sl.WinchLog, **options: float) -> dict[str, list[int]]:
+def left_out(log: sl.WinchLog, **options: Any) -> dict[str, list[int]]:
     fit, fit_rows, others = screen(ROBOT, log, **options)
     assert len(fit) == len(fit_rows)
     np.testing.assert_array_equal(fit.readings, log.readings[fit_rows])

@@ -191,7 +191,7 @@ def test_the_text_has_80_columns_and_is_complete(found: sl.Calibration, count: i
         error = one.standard_error
         told = [label for label, size in zip(one.parameters.labels, error, strict=True) if not np.isfinite(size)]
         lines = {line.split(" ")[0]: line for line in one.table().splitlines()}
-        assert all("not told" in lines[label] for label in told)
+        assert all("± unknown" in lines[label] for label in told)
         assert 1 <= len(told) <= 3
 
 

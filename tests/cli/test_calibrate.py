@@ -153,3 +153,62 @@ def test_the_help_names_the_default_unknowns() -> None:
     names = set(sl.calibration_poses(sl.load_robot("cogiro"), 3, candidates=30).parameters.names)
     words = set(re.findall(r"[a-z]+(?:_[a-z]+)+|mass", parameters["unknowns"].help))
     assert words == names
+
+
+def test_other_names_of_columns_and_further_unknowns(run: Run, files: Path) -> None:
+    text = (files / "winches.csv").read_text()
+    (files / "other.csv").write_text(text.replace("count_", "enc ").replace("load_cell_", "F"))
+    (files / "map.yaml").write_text('columns: {count: "enc {}", load_cell: "F{}"}\n')
+    plain = json.loads(run("robot.yaml", "winches.csv", *FEW, "--folds", "0", "--json").stdout)
+    told = json.loads(run("robot.yaml", "other.csv", *FEW, "--folds", "0", "--json", "--columns", "map.yaml").stdout)
+    here, there = ([one["value"] for one in found["numbers"]] for found in (told, plain))
+    np.testing.assert_allclose(here, there, rtol=1e-6)  # without commanded poses, the search has other initial values
+    more = json.loads(run("robot.yaml", "winches.csv", "--also", "linear_density", "--folds", "0", "--json").stdout)
+    usual = json.loads(run("robot.yaml", "winches.csv", "--folds", "0", "--json").stdout)
+    names = [one["name"] for one in usual["numbers"]]
+    assert [one["name"] for one in more["numbers"]] == [*names, "linear_density"]
+
+
+def test_deviations_and_common_values_of_unknowns(run: Run, files: Path) -> None:
+    robot, log = sl.load_robot(files / "robot.yaml"), sl.load_log(files / "winches.csv")
+    asked = "drum_radius* = 2 %,axial_stiffness[],length_zero*=5 cm,mass=2.5 kg,load_cell_gain[]=5 %"
+    told = json.loads(run("robot.yaml", "winches.csv", "--unknowns", asked, "--folds", "0", "--json").stdout)
+    wanted = [
+        sl.Unknown("drum_radius", True, 0.02),
+        sl.Unknown("axial_stiffness", False),
+        sl.Unknown("length_zero", True, 0.05),
+        sl.Unknown("mass", None, 2.5 / robot.mass),
+        sl.Unknown("load_cell_gain", False, 0.05),
+    ]
+    found = sl.calibrate(robot, log, wanted, folds=0)
+    assert [one["name"] for one in told["numbers"]] == list(found.parameters.labels)
+    assert len(told["numbers"]) == 1 + 8 + 1 + 1 + 8
+    np.testing.assert_allclose([one["standard_error"] for one in told["numbers"]], found.standard_error, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "parts"),
+    [
+        ("center_of_mass=5 %", ("center_of_mass: deviation", "'5 %'", "a number in m")),
+        ("mass=5 mm", ("mass: deviation", "'5 mm'")),
+        ("mass=-5 %", ("mass: deviation", "> 0 kg")),
+        ("mass=", ("mass: deviation", "''")),
+        ("drum=5 %", ("unknown", "'drum'", "drum_radius")),
+        ("mass**", ("unknown", "'mass*'", "mass")),
+    ],
+)
+def test_impossible_deviations_of_unknowns_are_refused(run: Run, unknown: str, parts: tuple[str, ...]) -> None:
+    result = run("robot.yaml", "winches.csv", "--unknowns", unknown)
+    assert isinstance(result.exception, sl.InvalidValueError) or result.exit_code == 2
+    for part in parts:
+        assert part in " ".join((result.output + str(result.exception)).split()), result.output
+
+
+def test_rests_of_a_log_with_motion_are_averaged(run: Run, files: Path) -> None:
+    log = sl.load_log(files / "winches.csv")
+    again = np.repeat(np.arange(len(log)), 20)
+    log.rows(again).replace(time=0.1 * np.arange(len(again))).save(files / "long.csv")
+    plain = json.loads(run("robot.yaml", "winches.csv", *FEW, "--folds", "0", "--json").stdout)
+    told = json.loads(run("robot.yaml", "long.csv", "--rest", "1 s", *FEW, "--folds", "0", "--json").stdout)
+    here, there = ([one["value"] for one in found["numbers"]] for found in (told, plain))
+    np.testing.assert_allclose(here, there, rtol=1e-9)

@@ -44,7 +44,7 @@ def numbers(*words: str) -> Any:
 
 
 def spawned(*words: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "sagline.cli", *words]
+    command = [sys.executable, "-m", "sagline", *words]
 
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=interrupts.heard

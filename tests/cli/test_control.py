@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import sagline as sl
-from sagline.cli.session import OperatorSession, StatusLine
+from sagline.cli.session import OperatorSession, _StatusLine
 from sagline.control.states import State
 from tests.control.rigs import rig
 from tests.tiers import wide
@@ -106,7 +106,7 @@ def test_the_status_line_has_the_width_of_the_terminal_and_is_removed(
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setenv("LINES", "24")
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    with StatusLine(shown=True) as line:
+    with _StatusLine(shown=True) as line:
         line.update("x" * 200)
         line.update("y" * 200)  # too soon
     out = capsys.readouterr().out
@@ -115,7 +115,7 @@ def test_the_status_line_has_the_width_of_the_terminal_and_is_removed(
     assert len(shown) == 79
     assert "y" not in out
     assert "\x1b[r" in out.rsplit("\x1b[7m", 1)[1]
-    with StatusLine(shown=False) as line:
+    with _StatusLine(shown=False) as line:
         line.update("x")
         line.ask()
     assert capsys.readouterr().out == ""

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import sagline as sl
-from sagline.cli.lengths import write_rows
-from sagline.cli.track import ConfirmedRun, summary
+from sagline.cli.lengths import _write_rows
+from sagline.cli.track import ConfirmedRun
 from sagline.core.table import csv_text
 
 ROBOT = sl.load_robot("article-suspended").replace(winches=sl.Winch(pulley_radius=0.1, dead_cable=4.0))
@@ -27,7 +27,7 @@ def test_written_lengths_of_a_robot_with_pulleys_include_all_cable_off_the_drum(
 
 def test_the_summary_counts_all_cable_off_the_drum() -> None:
     plan = sl.inverse(ROBOT, ENDS)
-    told = summary(ConfirmedRun(sl.confirm(plan), 0.0))
+    told = ConfirmedRun(sl.confirm(plan), 0.0).summary()
     straight = np.linalg.norm(ENDS.position[:, None] + ROBOT.platform_anchors - ROBOT.frame_anchors, axis=-1)
     assert straight.min() + 4.0 < told["unstrained_length_min_m"] < straight.min() + 4.0 + 0.2 * np.pi
     assert told["unstrained_length_max_m"] == plan.unstrained_length.max()
@@ -38,7 +38,7 @@ def test_feasible_samples_are_written_with_their_own_times(tmp_path: Path) -> No
     path = sl.quintic_path([(7.4, 5.4, 0.1), (0.0, 0.0, 1.5)], durations=1.0, rate=4.0)
     plan = sl.inverse(sl.load_robot("article-suspended"), path)
     assert plan.feasible.tolist()[::4] == [False, True]
-    assert write_rows(plan, "L{}", plan.unstrained_length.tolist(), file) == 1
+    assert _write_rows(plan, "L{}", plan.unstrained_length.tolist(), file) == 1
     rows = np.loadtxt(file, delimiter=",", skiprows=1)
     np.testing.assert_array_equal(rows[:, 0], path.time[plan.feasible])
     np.testing.assert_array_equal(rows[:, 1:], plan.unstrained_length[plan.feasible])

@@ -17,14 +17,14 @@ import sagline as sl
 from sagline import Plan
 from sagline.cli import view
 from sagline.cli.main import app
-from sagline.cli.view import ServerAddress
+from sagline.cli.view import ServerOptions
 from sagline.files.mcap_writer import Recorder
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.files.test_mcap import assert_same
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
-NOWHERE = ServerAddress("", 0, browser=False)
+NOWHERE = ServerOptions("", 0, True, 1, None, False)
 ROBOT = sl.load_robot("article-prototype")
 
 
@@ -120,7 +120,7 @@ def test_a_growing_log_is_awaited_until_its_first_bytes_exist(
 
     monkeypatch.setattr(view.time, "sleep", sleep)  # type: ignore[attr-defined]
     monkeypatch.setattr("sagline.cli.view.serve", lambda robot, address, *, played, **_: len(played.time))
-    assert view.view_log(log, None, NOWHERE, live=True, truth=log.parent / "twin.mcap") == 201
+    assert view._view_log(log, None, NOWHERE, live=True, truth=log.parent / "twin.mcap") == 201
     assert looks == [view.LOOK] * 3
 
 
@@ -129,7 +129,7 @@ def test_a_file_that_is_no_log_is_not_awaited(tmp_path: Path, said: bytes | None
     file = tmp_path / "run.mcap"
     file.mkdir() if said is None else file.write_bytes(said)
     with refused(kind=sl.FileError, file=file):
-        view.view_log(file, None, NOWHERE, live=True)
+        view._view_log(file, None, NOWHERE, live=True)
 
 
 @extended
@@ -144,7 +144,7 @@ def test_a_log_is_followed_before_it_exists(tmp_path: Path, monkeypatch: pytest.
         def extend(self, session: Any) -> None:
             lengths.append(len(session.time))
 
-    def serve(robot: sl.Robot, address: ServerAddress, *, meanwhile: Any, played: Any, **page: Any) -> int:
+    def serve(robot: sl.Robot, address: ServerOptions, *, meanwhile: Any, played: Any, **page: Any) -> int:
         lengths.append(len(played.time))
         around: AbstractContextManager[None] = meanwhile(Page())
         with around:
@@ -165,7 +165,7 @@ def test_a_log_is_followed_before_it_exists(tmp_path: Path, monkeypatch: pytest.
     writer = threading.Thread(target=write)
     monkeypatch.setattr("sagline.cli.view.serve", serve)
     writer.start()
-    assert view.view_log(file, None, NOWHERE, live=True) == 0
+    assert view._view_log(file, None, NOWHERE, live=True) == 0
     writer.join()
     assert lengths == sorted(lengths)  # equal if an event arrived, or if a cycle was split
     assert lengths[-1] == 200

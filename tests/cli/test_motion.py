@@ -13,6 +13,7 @@ import sagline as sl
 from sagline import to_shape
 from sagline.cli.main import app
 from sagline.cli.values import quantity, ratio
+from tests.dynamics.machines import prototype
 from tests.tiers import extended
 
 WAY = "durations: 1\nrate: 100\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
@@ -116,6 +117,27 @@ def test_a_break_agrees_with_the_library_and_its_file_can_be_read(folder: FilePa
     before, after = f"{event.tension_before:,.1f} N", f"{event.tension_after:,.1f} N"
     assert re.search(rf"\b0\.200 s: .*\bcable 3, {before}\b.*\b{after}", text)
     assert (folder / "sim-energy.png").exists()
+
+
+def test_pieces_of_a_broken_cable_and_limits_of_winches(folder: FilePath) -> None:
+    weak = prototype(torque_limit=0.12)
+    (folder / "weak.yaml").write_text(sl.dump_robot(weak))
+    words = ["--pose", "0,0,1.0", "--winches", "robot", "--cable-mass", "lumped", "--break", "3@0.02s@0.5", "--after"]
+    result = sagline("simulate", "weak.yaml", *words, "0.05", "--no-figures", "--out", "sim.nc")
+    assert result.exit_code == 0, result.stderr
+    first, cut = (next(each for each in result.stdout.splitlines() if kind in each) for kind in ("saturate", "break"))
+    assert first.split()[3] == "(torque)"
+    assert cut.split()[0] == "0.020"
+    nodes = sl.load_simulation(folder / "sim.nc").nodes
+    assert nodes is not None
+    assert np.isnan(nodes[-1, 3, :, 0]).nonzero()[0].tolist() == [10]
+
+
+@pytest.mark.parametrize("place", ["1.2", "-1", "frame"])
+def test_positions_of_breaks_that_are_refused(folder: FilePath, place: str) -> None:
+    result = sagline("simulate", "cogiro", "--cable-mass", "lumped", "--break", f"3@0.1s@{place}")
+    assert result.exit_code == 2
+    assert place.lstrip("-") in result.stderr
 
 
 def test_cables_above_their_limit_are_named(folder: FilePath) -> None:

@@ -17,8 +17,8 @@ import sagline as sl
 from sagline.cables.cable import ROPES
 from sagline.cli.main import app
 from sagline.cli.new import GRID, ROPE_NAMES
-from sagline.cli.options import level_grid
 from sagline.robot.catalogue import Design
+from sagline.robot.pose import level_grid
 from tests.tiers import extended
 
 

@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -21,6 +21,9 @@ import sagline as sl
 import sagline.cli
 from sagline.cli import values
 from sagline.cli.main import FORMER, MODULES, NAMES, app
+from sagline.cli.options import TensionVariable, expanded, tension_named
+from sagline.core.arguments import word_of
+from sagline.core.surface import public_names
 from tests.files.executions import execution
 from tests.tiers import extended
 
@@ -43,7 +46,7 @@ def conversions() -> Iterator[tuple[str, str]]:
     for file in Path(sagline.cli.__file__).parent.glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "converted":
-                name = ast.literal_eval(node.args[2]) if isinstance(node.args[2], ast.Constant) else ""
+                name = ast.literal_eval(node.args[3]) if isinstance(node.args[3], ast.Constant) else ""
                 yield file.name, name
 
 
@@ -65,7 +68,7 @@ def test_options_with_one_name_have_one_meaning(name: str) -> None:
 def kind_of(command: str, option: Any) -> str:
     """Type of one value of an option that can be repeated, or None."""
     module = import_module(f"sagline.cli.{MODULES.get(command, command)}")
-    kind = get_type_hints(getattr(module, command.replace("-", "_")))[option.name]
+    kind = expanded(getattr(module, command.replace("-", "_"))).__annotations__[option.name]
     for _ in range(2):
         (kind,) = [each for each in get_args(kind) or (kind,) if each is not type(None)]
     return str(kind)
@@ -245,3 +248,21 @@ def test_run_draws_and_writes_only_on_request(folder: Path, monkeypatch: pytest.
     kinds = {Path(name).suffix for name in names_in(folder)}
     assert kinds == {".nc", ".csv", ".glb"}
     assert len(names_in(folder)) == 4 + 4 + 2
+
+
+def test_every_tension_method_is_an_option() -> None:
+    for option, kind in (("--tension", sl.TensionMethod), ("--model", sl.CableModel)):
+        public = {name: getattr(sl, name) for name in public_names("sagline")}
+        names = {word_of(name) for name, value in public.items() if isinstance(value, type) and issubclass(value, kind)}
+        for command in OPTIONS[option].values():
+            listed = command.help.removesuffix(".").partition(": ")[2].split(", ")
+            assert {*listed} == names - {word_of(kind.__name__), "quadratic-program"}
+    assert type(tension_named("p-norm", TensionVariable.HORIZONTAL)) is sl.tension.PNorm
+
+
+@pytest.mark.parametrize("words", [("track", "cogiro"), ("export-c", "cogiro")])
+def test_an_unknown_tension_method_is_refused(words: tuple[str, ...]) -> None:
+    result = CliRunner().invoke(app, [*words, "--tension", "foo"])
+    assert result.exit_code == 2
+    assert "'foo'" in result.stderr
+    assert "'minimum-norm'" in result.stderr

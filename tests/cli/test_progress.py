@@ -6,12 +6,12 @@ from io import StringIO
 
 from rich.console import Console
 
-from sagline.cli.terminal import progress_line
+from sagline.cli.terminal import working
 
 
 def test_a_bar_appears_on_a_terminal_when_work_takes_long() -> None:
     text = StringIO()
-    with progress_line(Console(file=text, force_terminal=True, width=100), "first part") as line:
+    with working("first part", Console(file=text, force_terminal=True, width=100)) as line:
         progress = line.stage("second [part]\x1b")
         progress(1, 10)
         line._bar.refresh()
@@ -32,6 +32,6 @@ def test_a_bar_appears_on_a_terminal_when_work_takes_long() -> None:
 
 def test_nothing_is_written_to_a_file() -> None:
     text = StringIO()
-    with progress_line(Console(file=text), "work") as line:
+    with working("work", Console(file=text)) as line:
         line.stage("more work")(1, 2)
     assert text.getvalue() == ""

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.cli.control import TwinMonitor
+from sagline.cli.control import _TwinMonitor
 from sagline.cli.main import app
 from sagline.files.mcap_reader import read_log
 from sagline.files.mcap_writer import Recorder
@@ -62,7 +62,7 @@ def test_the_first_lines_fit_80_columns_and_ctrl_c_is_130(words: list[str], monk
 
 def test_changes_of_the_plcs_are_printed(capsys: pytest.CaptureFixture[str], snapshot: Any) -> None:
     machine = Machine(sl.load_robot("article-prototype"), seed=1, faults=["servo 7 trips at 0.5 s"])
-    watch, link = TwinMonitor(machine), machine.link()
+    watch, link = _TwinMonitor(machine), machine.link()
     with closing(link):
         for counter in range(1, 100):
             link.exchange(a_command(8, owner=OWNER, counter=counter, mode=sl.control.Mode.HOLD, enable=np.ones(8) > 0))
@@ -74,7 +74,7 @@ def test_changes_of_the_plcs_are_printed(capsys: pytest.CaptureFixture[str], sna
 
 def test_a_log_contains_the_true_poses(tmp_path: Path) -> None:
     machine = Machine(sl.load_robot("article-prototype"), seed=1, faults=["cable 0 breaks at 0 s"])
-    watch, seen = TwinMonitor(machine), []
+    watch, seen = _TwinMonitor(machine), []
     with Recorder(tmp_path / "twin.mcap", machine.robot) as watch.recorder:
         for _ in range(30):
             machine.advance()

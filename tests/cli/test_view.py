@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path as FilePath
 from typing import Any
 from urllib.request import urlopen
@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.cli.view import played_beside, played_in
+from sagline.cli.view import _played_beside, _played_in
 from tests.cli import interrupts
 from tests.refusal import refused
 from tests.tiers import extended
@@ -57,6 +57,28 @@ def test_it_serves_a_page_and_ctrl_c_during_a_drag_ends_it() -> None:
         assert "Traceback" not in said + complained
         assert "Stopped." in complained
         client.break_off()
+
+
+def test_ctrl_c_ends_the_command_if_an_imported_package_catches_the_exception(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def catch(page: Any) -> None:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        page.refresh()
+
+    def draw(_: Any) -> None:
+        raise AssertionError("the page continues")
+
+    monkeypatch.setattr("sagline.viewer.page.Page._update", catch)
+    monkeypatch.setattr("sagline.viewer.page.Page._draw", draw)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        result = CliRunner().invoke(app, ["view", "article-suspended", "--port", "0", "--no-browser"])
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert result.exit_code == 0, result.exception
+    assert "Stopped." in result.output
 
 
 @pytest.mark.parametrize(
@@ -99,11 +121,22 @@ def test_a_port_in_use_is_reported() -> None:
     assert "--port 0" in result.stderr
 
 
+def test_five_cables_have_no_page_because_a_position_is_not_sufficient(tmp_path: FilePath) -> None:
+    angle = np.arange(5.0)[:, None]
+    circle = np.hstack((np.cos(angle), np.sin(angle), np.full_like(angle, 3.0)))
+    file = tmp_path / "five.yaml"
+    robot = sl.Robot("five", circle, 0.1 * circle, sl.Cable(0.1, 1e5), 10.0, np.eye(3))
+    file.write_text(sl.dump_robot(robot))
+    result = CliRunner().invoke(app, ["view", str(file), "--no-browser"])
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Error: five: ")
+
+
 def test_a_simulation_is_played_like_a_run(tmp_path: FilePath) -> None:
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
     swing = sl.simulate(state, duration=0.5, events=sl.Break(cable=3, time=0.25))
     swing.save(tmp_path / "sim.nc")
-    played = played_in(sl.load_robot("cogiro"), tmp_path / "sim.nc")
+    played = _played_in(sl.load_robot("cogiro"), tmp_path / "sim.nc")
     assert (played.name, played.duration) == ("simulation", 0.5)
     np.testing.assert_array_equal(played.at(0.0).pose.position, swing.pose.position[0])
     assert np.isnan(played.at(0.5).tension[3])
@@ -115,8 +148,8 @@ def test_two_runs_are_named_by_their_files(tmp_path: FilePath) -> None:
     first, second = tmp_path / "a.nc", tmp_path / "b.nc"
     for file in (first, second):
         sl.inverse(robot, sl.Pose([[0.0, 0.0, 1.5], [0.1, 0.0, 1.5]], np.stack([np.eye(3)] * 2))).save(file)
-    beside = played_beside(robot, first, second)
+    beside = _played_beside(robot, first, second)
     assert beside.names == ("a.nc", "b.nc")
     assert beside.played.duration == 1.0
     with refused(kind=sl.FileError, file=second):
-        played_beside(sl.load_robot("cogiro"), first, second)
+        _played_beside(sl.load_robot("cogiro"), first, second)

@@ -11,7 +11,7 @@ import pytest
 
 import sagline as sl
 from sagline.control.controller import Controller
-from sagline.control.homing import _zeros, length_tolerance
+from sagline.control.homing import _length_tolerance, _zeros
 from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from tests.control.rigs import HOME, at, imperfect, prototype, rest, rig, state_of
@@ -40,7 +40,7 @@ def without_zeros() -> sl.Robot:
 
 
 def tolerance(robot: sl.Robot) -> Array:
-    return length_tolerance(robot, STATE, sl.Catenary())
+    return _length_tolerance(robot, STATE, sl.Catenary())
 
 
 @pytest.mark.parametrize(("by", "cable"), [((0.1, 0.0, 0.0), 4), ((0.0, 0.3, 0.0), 6)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.null_space import balance_slope, parity
+from sagline.control.null_space import _balance_slope, parity
 from sagline.core.arrays import Array
 from tests.control.stops import PROTOTYPE, stops
 from tests.kinematics.feasible import feasible_plan
@@ -19,7 +19,7 @@ PLANS: dict[str, Callable[[], sl.Plan]] = {
 
 def visible(state: sl.Equilibrium) -> Array:
     """V = 1 - N N^T, by the orthonormal basis of the null space."""
-    basis = np.linalg.svd(balance_slope(state))[2][..., 6:, :]
+    basis = np.linalg.svd(_balance_slope(state))[2][..., 6:, :]
     found: Array = np.eye(8) - np.swapaxes(basis, -1, -2) @ basis
     return found
 
@@ -36,7 +36,7 @@ def test_the_wrench_of_one_shortened_cable(name: str) -> None:
     """Fixed platform: one length is shorter, by the cable model only."""
     plan = PLANS[name]()
     state, robot = plan.state, plan.state.one_robot
-    slope, step = balance_slope(state), 1e-5
+    slope, step = _balance_slope(state), 1e-5
     for cable in range(8):
         change = np.zeros(8)
         change[cable] = step
@@ -69,7 +69,7 @@ def test_two_cells_resemble_each_other_and_a_load_not_too_much() -> None:
     state = stops().state
     cells = visible(state)
     assert likeness(cells).max() == pytest.approx(0.71, abs=0.005)
-    load = np.linalg.pinv(balance_slope(state)) @ np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    load = np.linalg.pinv(_balance_slope(state)) @ np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     load /= np.linalg.norm(load, axis=-1, keepdims=True)
     like = np.abs(load) / np.sqrt(np.einsum("...ii->...i", cells))
     assert like.max() == pytest.approx(0.59, abs=0.005)

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 import sagline as sl
 from sagline.control.checks import plan_motion
 from sagline.control.link import RAMP
-from sagline.control.set_points import LEAD_SPEED, Along, Fade
+from sagline.control.set_points import LEAD_SPEED, Along, _Fade
 from sagline.control.states import RefusedError
 from tests.control.rigs import at, prototype, rig, spy_of
 
@@ -19,7 +19,7 @@ PERIOD = 0.01
 @pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 5e-3, 0.03])
 def test_a_lead_decays_smoothly_within_its_speed(size: float) -> None:
     lead = size * np.array([1.0, -0.5, 0.0])
-    fade, lengths, rates = Fade(lead, PERIOD), [lead], [np.zeros(3)]
+    fade, lengths, rates = _Fade(lead, PERIOD), [lead], [np.zeros(3)]
     while (left := fade.step()) is not None:
         lengths.append(left[0])
         rates.append(left[1])

@@ -60,6 +60,7 @@ def page(browser: Browser, site: Path) -> Iterator[Page]:
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
     page.goto(site.as_uri())
+    page.locator("[aria-valuetext]").first.wait_for()  # the script has computed the first numbers
     yield page
     page.close()
     assert complaints == []

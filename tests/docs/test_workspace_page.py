@@ -37,4 +37,4 @@ def test_rays_miss_the_printed_part_of_the_volume() -> None:
 
 def test_workspaces_of_both_robots_of_the_first_run() -> None:
     volumes = [sl.workspace(sl.load_robot(name), cells=CELLS).volume for name in ROBOTS]
-    assert f"{volumes[0]:.0f} m³ and {volumes[1]:.0f} m³ of" in README
+    assert f"{volumes[0]:.0f} m³ and {volumes[1]:.0f} m³ inside" in README

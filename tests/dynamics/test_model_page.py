@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import sagline as sl
-from sagline.dynamics.simulation.chain_plant import chains_at_rest
+from sagline.dynamics.simulation.chain_equilibrium import chains_at_rest
 from tests.dynamics.simulation.test_chains import cogiro, moved
 from tests.tiers import extended
 

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.cli.installation import KINDS, example_files
+from sagline.cli.installation import KINDS, _example_files
 from sagline.cli.main import app
 from sagline.files.mcap_reader import read_log
 from sagline.files.mcap_writer import Recorder
@@ -128,9 +128,9 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         return 0
 
     monkeypatch.setattr("sagline.cli.view.view_robot", serve)
-    monkeypatch.setattr("sagline.cli.view.view_run", serve_run)
-    monkeypatch.setattr("sagline.cli.view.view_calibration", serve_found)
-    monkeypatch.setattr("sagline.cli.view.view_log", serve_log)
+    monkeypatch.setattr("sagline.cli.view._view_run", serve_run)
+    monkeypatch.setattr("sagline.cli.view._view_calibration", serve_found)
+    monkeypatch.setattr("sagline.cli.view._view_log", serve_log)
     monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.article.FIGURES", ())
     monkeypatch.setattr("sagline.cli.article.CELLS", 4)
@@ -192,9 +192,9 @@ def test_an_installed_package_contains_the_examples(tmp_path: Path) -> None:
     package = Path(sl.__file__).parent
     shutil.copytree(package, tmp_path / "sagline", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(ROOT / "examples", tmp_path / "sagline" / "examples")
-    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from sagline.cli.installation import example_files; "
-    code += "print(*example_files(), sep='\\n')"
+    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from sagline.cli.installation import _example_files; "
+    code += "print(*_example_files(), sep='\\n')"
     done = subprocess.run([sys.executable, "-I", "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
     found = [Path(line) for line in done.stdout.splitlines()]
     assert {file.parent for file in found} == {tmp_path / "sagline" / "examples"}
-    assert [file.name for file in found] == [file.name for file in example_files()]
+    assert [file.name for file in found] == [file.name for file in _example_files()]

@@ -120,7 +120,7 @@ def test_all_methods_and_forward_with_pulleys(name: str, tmp_path: Path) -> None
     rng = np.random.default_rng(7)
     robot = robot_of(name)
     redundant = robot.cable_count - robot.degrees_of_freedom
-    every = [make() for make in tension_methods.METHODS.values()]
+    every = [make() for make in tension_methods.methods_by_name().values()]
     methods = [each for each in every if each.most_redundant is None or redundant <= each.most_redundant]
     ends = [sl.MinimumNorm("frame_end"), sl.Centroid("horizontal")][: 2 if redundant <= 2 else 1]
     methods += ends if redundant else []
@@ -232,7 +232,7 @@ def test_a_pose_without_full_rank_is_singular(tmp_path: Path) -> None:
 
 
 def test_the_source_has_no_recursion_heap_or_loop_without_a_bound(tmp_path: Path) -> None:
-    methods = [make() for make in tension_methods.METHODS.values()]
+    methods = [make() for make in tension_methods.methods_by_name().values()]
     source, _, _ = sl.export_c(sl.load_robot("ipanema-3-pulleys"), tmp_path / "s.c", tension=methods, forward=True)
     text = re.sub(r"/\*.*?\*/|^#.*?$", "", source.read_text(), flags=re.DOTALL | re.MULTILINE)
     heads = list(

@@ -20,7 +20,7 @@ from tests.tiers import extended
 pytestmark = extended
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "microcontroller.md"
-EVERY = [make() for make in tension_methods.METHODS.values()]
+EVERY = [make() for make in tension_methods.methods_by_name().values()]
 # all methods at feasible and infeasible poses, then forward with and without an initial pose
 MAIN = """\
 #include <stdio.h>

@@ -15,7 +15,7 @@ from sagline import dump_robot
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.files import calibration_file, netcdf
 from sagline.files.calibration_file import FORMAT
-from sagline.files.netcdf import read_dataset
+from sagline.files.netcdf import _read_dataset
 from sagline.files.robot_file import parse_robot
 from sagline.robot.tolerances import Provenance
 from tests.calibration.made_up import made_up
@@ -159,7 +159,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Da
     monkeypatch.setattr(calibration_file, "parse_robot", cache(parse_robot))
 
     def load(data: xarray.Dataset) -> sl.Calibration:
-        monkeypatch.setattr(netcdf, "read_dataset", lambda *_: data)
+        monkeypatch.setattr(netcdf, "_read_dataset", lambda *_: data)
         return sl.load_calibration(tmp_path / "edited.nc")
 
     return load
@@ -169,7 +169,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Da
 def whole(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     file = tmp_path_factory.mktemp("calibration") / "found.nc"
     calibration("as usual").save(file)
-    return read_dataset(file, FORMAT)
+    return _read_dataset(file, FORMAT)
 
 
 @pytest.mark.parametrize("edit", wide(reversed(EDITS)), ids=lambda edit: edit.__name__)

@@ -13,7 +13,7 @@ import pytest
 
 import sagline as sl
 from sagline.control.link import GroupFault, Mode
-from sagline.files.c_source import source_text
+from sagline.files.c_source import _source_text
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
 from sagline.twin.plc_program import Order, PlcLimits, Program
 from tests.files.scl import Array, data_block, function_block, variables
@@ -28,7 +28,7 @@ SPEED = 0.4
 @cache
 def text() -> str:
     """The source for a robot."""
-    return source_text(ROBOT)
+    return _source_text(ROBOT)
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)

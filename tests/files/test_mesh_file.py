@@ -12,7 +12,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline.files import mesh_file
-from sagline.files.mesh_file import first_crossing
+from sagline.files.mesh_file import _first_crossing
 from tests.files.wording import wording
 from tests.interference.scenes import box_mesh
 from tests.refusal import refused
@@ -116,12 +116,12 @@ def test_meshes_that_are_open_or_cross_themselves_are_refused_with_their_extent(
 
 def test_points_of_self_intersection_are_on_both_surfaces() -> None:
     mesh = overlapping()
-    point = first_crossing(sl.Mesh(mesh.vertices, mesh.faces))
+    point = _first_crossing(sl.Mesh(mesh.vertices, mesh.faces))
     assert point is not None
     for low in ((-0.5, -0.5, -0.5), (0.0, -0.25, -0.375)):  # of each box
         assert (point >= np.array(low) - 1e-9).all()
         assert (point <= np.array(low) + 1.0 + 1e-9).all()
-    assert first_crossing(box_mesh([1, 2, 3], [0, 0, 0])) is None
+    assert _first_crossing(box_mesh([1, 2, 3], [0, 0, 0])) is None
 
 
 def test_larger_meshes_are_not_searched_for_crossings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

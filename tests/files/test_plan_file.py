@@ -53,7 +53,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Plan:
-        monkeypatch.setattr(netcdf, "read_dataset", lambda *_: data)
+        monkeypatch.setattr(netcdf, "_read_dataset", lambda *_: data)
         return sl.load_plan("run.nc")
 
     return load
@@ -312,7 +312,7 @@ def test_another_robot_in_the_file(read: Reader, data: xr.Dataset) -> None:
             ),
         ),
         ("quaternion", 2.0, ("quaternion 2: length", "2.2360679775")),
-        ("time", 1e9, ("time[3]", "0.375 s", "> 1000000000.0 s (the one before)")),
+        ("time", 1e9, ("time[3]", "0.375 s", "> 1000000000.0 s, the previous time")),
     ],
 )
 def test_impossible_values(read: Reader, data: xr.Dataset, name: str, value: float, parts: Parts) -> None:

@@ -6,7 +6,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 from sagline import FileError
-from sagline.files.reading import exists, read_bytes, read_text
+from sagline.files.reading import HDF_BEGIN, exists, read_bytes, read_text
 from tests.files.wording import wording
 from tests.refusal import refused
 
@@ -29,8 +29,9 @@ def test_text_in_utf_8(tmp_path: Path, mark: bytes) -> None:
         b"\xed\xa0\x80",
         b"a" * 1_000_001,
         b"a" * 3_000_000,
+        HDF_BEGIN + b"a" * 3_000_000,
     ],
-    ids=["UTF-16", "UTF-16 without a mark", "UTF-32", "Latin-1", "zero byte", "surrogate", "1 MB", "3 MB"],
+    ids=["UTF-16", "UTF-16 without a mark", "UTF-32", "Latin-1", "zero byte", "surrogate", "1 MB", "3 MB", "NetCDF"],
 )
 def test_other_content_is_refused(tmp_path: Path, data: bytes, snapshot: SnapshotAssertion) -> None:
     file = tmp_path / "a.txt"

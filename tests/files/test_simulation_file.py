@@ -74,6 +74,21 @@ def test_a_broken_cable_and_a_dropped_load_are_saved(tmp_path: FilePath, cable_m
     assert_same(simulation, sl.load_simulation(tmp_path / "sim.nc"))
 
 
+def test_limits_of_drives_and_pieces_of_broken_cables_are_saved(tmp_path: FilePath) -> None:
+    later = Occurrence(0.4, "break", 3, 0.0, 1.0), Occurrence(0.5, "saturate", 0, 1.0, 2.0, "torque")
+    happened = (*HAPPENED[:2], *later)
+    simulation = a_simulation(happened)
+    nodes = np.array(simulation.nodes)
+    nodes[2:, 3, [0, 1, 3, 4]] = 0.5  # two pieces, with NaN between them
+    simulation = replace(simulation, nodes=nodes)
+    simulation.save(tmp_path / "sim.nc")
+    again = sl.load_simulation(tmp_path / "sim.nc")
+    assert_same(simulation, again)
+    assert [event.limit for event in again.events] == [None, None, None, "torque"]
+    with refused("event_limit[3]", "'power'"):
+        replace(simulation, events=(*happened[:3], replace(happened[3], limit="power"))).save(tmp_path / "sim.nc")
+
+
 def test_all_fields_of_a_simulation_are_saved() -> None:
     places = {quantity.place.split(".")[0] for quantity in (TIME, *SAMPLES, LARGEST, NODES)}
     told = {"robot", "events", "cable_mass", "step", "integrator", "winches", "winding", "damping"}
@@ -132,7 +147,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Simulation:
-        monkeypatch.setattr(netcdf, "read_dataset", lambda *_: data)
+        monkeypatch.setattr(netcdf, "_read_dataset", lambda *_: data)
         return sl.load_simulation("sim.nc")
 
     return load

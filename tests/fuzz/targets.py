@@ -95,7 +95,7 @@ def _show_cache(file: Path) -> int:
     place.mkdir(parents=True, exist_ok=True)
     (place / file.name).write_bytes(file.read_bytes())
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
-        return cache()
+        return cache(clear=False, as_json=False)
 
 
 def targets(folder: Path) -> list[Target]:

@@ -61,3 +61,36 @@ def test_lengths_close_over_large_pulleys(name: str, density: float, axis: float
     plan = sl.inverse(robot, sl.Pose(place, np.eye(3)), tension=sl.MinimumNorm())
     assert plan.feasible.mean() > 0.9
     assert np.nanmax(closure(robot, plan)) < 2e-11
+
+
+@pytest.mark.parametrize(("count", "force"), [(5, [-5.0, 5.0, -10.0]), (6, [-2.0, 3.0, -5.0])])
+def test_weightless_cables_without_tension_leave_pulleys_along_their_chords(count: int, force: list[float]) -> None:
+    turn = 2.0 * np.pi * np.arange(count) / count
+    anchors = np.stack([2.0 * np.cos(turn), 2.0 * np.sin(turn), np.full(count, 2.0)], axis=1)
+    robot = sl.Robot(
+        "weightless", anchors, np.zeros((count, 3)), sl.Cable(0.1, 1e9), 1.0, None,
+        motion_pattern="3T", gravity=0.0, tension_min=0.0, tension_max=100.0, winches=sl.Winch(0.05),
+    )  # fmt: skip
+    poses = sl.Pose([[0.0, 0.0, 0.0], [0.2, 0.1, 0.3]], np.eye(3))
+    exact, straight = (
+        sl.inverse(robot, poses, model, wrench=[*force, 0.0, 0.0, 0.0]) for model in (sl.Catenary(), sl.Straight())
+    )
+    assert exact.feasible.all()
+    assert np.abs(exact.state.chord_tension).min() <= 1e-15
+    assert np.allclose(exact.unstrained_length, straight.unstrained_length, rtol=0.0, atol=1e-6)
+
+
+def test_cables_to_ends_above_a_pulley_leave_it_before_the_end() -> None:
+    anchors = np.array([[0.0, 0.0, 0.0], [2.0, 1.5, 3.0], [2.0, -1.5, 3.0], [-2.5, 0.0, 3.0]])
+    robot = sl.Robot(
+        "above", anchors, np.zeros((4, 3)), sl.Cable(0.25, 400.0), 3.0, None,
+        motion_pattern="3T", tension_min=0.0, winches=sl.Winch(0.15),
+    )  # fmt: skip
+    near = (1e-3, 0.03, 0.05, 0.12, 0.16, 0.25)  # horizontal distances from the swivel axis of the lower pulley [m]
+    poses = sl.Pose([[x, 0.0, z] for x in near for z in (0.5, 1.5, 2.5)], np.eye(3))
+    plan = sl.inverse(robot, poses, tension=sl.MinimumNorm())
+    assert plan.feasible.all()
+    assert (plan.state.cables.span > 0.0).all()
+    assert (plan.state.unstrained_length < 5.0).all()
+    assert closure(robot, plan).max() < 2e-11
+    assert (sl.margin(robot, poses).value > 0.0).all()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+import sagline.control.checks
 from sagline.kinematics import inverse_rows
 from tests.kinematics.feasible import box_poses
 

@@ -9,6 +9,7 @@ import sagline as sl
 from sagline.robot.drum import drums_of
 from tests.kinematics.winches import wound
 from tests.refusal import refused
+from tests.tension.reference import presets
 
 LIMITS: dict[str, Any] = {"inertia": 2e-4, "friction": 15.0, "speed_limit": 350.0, "torque_limit": 2.0}
 
@@ -130,3 +131,26 @@ def test_a_preset_with_only_a_drum_radius_has_rates() -> None:
     friction = 15.0 * np.sign(rates.motor_speed)
     expected = 3.19e-5 * rates.motor_acceleration + (friction - rates.drum_tension) * 0.03 / 20.0
     np.testing.assert_allclose(rates.motor_torque, expected, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("robot", presets(), ids=lambda robot: robot.name)
+def test_every_preset_with_drums_has_rates_and_the_others_name_what_is_missing(robot: sl.Robot) -> None:
+    assert robot.test_box is not None
+    middle, size = 0.5 * (robot.test_box.low + robot.test_box.high), robot.test_box.high - robot.test_box.low
+    plan = sl.inverse(robot, sl.quintic_path([middle, middle + 0.05 * size], durations=2.0, rate=20))
+    if robot.winches is None or robot.winches.drum_radius is None:
+        with pytest.raises(sl.InvalidValueError) as caught:
+            sl.winch_rates(plan)
+        assert "drum_radius" in str(caught.value)
+        return
+    rates = sl.winch_rates(plan)
+    assert plan.length_rate is not None
+    assert plan.feasible.all()
+    paid_out = plan.length_rate * (1.0 + robot.winches.winding_tension / robot.cables.axial_stiffness)
+    radius = paid_out[1:-1] / rates.drum_speed[1:-1]
+    assert radius == pytest.approx(np.broadcast_to(robot.winches.drum_radius, radius.shape), rel=0.1)
+    assert rates.motor_torque is not None
+    assert np.isfinite(rates.motor_torque).all()
+    # a slow motion: the torque at the motor is that of the cable's tension and the friction
+    against = robot.winches.friction * np.sign(rates.drum_speed[1:-1]) - rates.drum_tension[1:-1]
+    assert rates.motor_torque[1:-1] == pytest.approx(against * radius / robot.winches.gear, rel=0.2, abs=0.02)

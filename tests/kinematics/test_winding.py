@@ -226,7 +226,7 @@ def wrong_guides() -> list[tuple[Any, str, *tuple[str, ...]]]:
         (good[:7], "guides", "7 values", "one value, or 8, one per cable"),
         (7.0, "guides", "of shape ()"),
         ("drum", "guides", "'drum'", "numbers"),
-        ([[0, 0, 0], [0, 0, 0]], "guides[1]", "at the guide before it"),
+        ([[0, 0, 0], [0, 0, 0]], "guides[1]", "at the previous guide"),
         ([[0, 0, 1e300]], "guides[0, 2]", "1e+300 m"),
     ]
     rng = np.random.default_rng(8)
@@ -238,7 +238,7 @@ def wrong_guides() -> list[tuple[Any, str, *tuple[str, ...]]]:
             found.append((bad, f"guides[{i}, {j}, {axis}]", f"{number:g} m", "finite"))
         twin = good.copy()
         twin[i, 1 + j % 2] = twin[i, j % 2]
-        found.append((twin, f"guides[{i}, {1 + j % 2}]", "at the guide before it"))
+        found.append((twin, f"guides[{i}, {1 + j % 2}]", "at the previous guide"))
         last = good.copy()
         last[i, -1] = sl.load_robot("cogiro").frame_anchors[i]
         found.append((last, f"guides[{i}, 2]", "at the frame anchor"))

@@ -11,10 +11,10 @@ import pytest
 
 from sagline.control import Mode, Sample
 from sagline.plc import block_link
-from sagline.plc.block_link import BlockLink, GroupThread
+from sagline.plc.block_link import BlockLink, _GroupThread
 from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block
-from sagline.plc.modbus_link import ModbusWire
-from sagline.plc.s7_link import S7Wire
+from sagline.plc.modbus_link import _ModbusWire
+from sagline.plc.s7_link import _S7Wire
 from sagline.plc.wire import WireError
 from tests.control.protocol import OWNER_TIMEOUT
 from tests.plc.protocol import Refusal
@@ -175,7 +175,7 @@ def test_commands_that_wait_too_long_are_discarded(late: float, written: list[by
             return True
 
     clock, wire = [0.0], Wire()
-    group = GroupThread(1, 2, wire, lambda: clock[0])
+    group = _GroupThread(1, 2, wire, lambda: clock[0])
     group.hand_over(TO_PLC, b"command")
     group.start()
     group.settled.wait(PATIENCE)
@@ -189,7 +189,7 @@ class Scripted:
 
     def __init__(self, *answers: bytes | Exception, step: float = 0.01) -> None:
         self.answers, self.time, self.step = list(answers), 0.0, step
-        self.group = GroupThread(0, 2, self, self.clock)
+        self.group = _GroupThread(0, 2, self, self.clock)
         self.counters, self.troubles = list[int | None](), list[str]()
 
     def clock(self) -> float:
@@ -275,7 +275,7 @@ class Broken:
 
 @pytest.mark.parametrize("error", [struct.error("short"), AttributeError("recv"), AssertionError()])
 def test_errors_of_a_library_are_reported_as_connection_errors(error: Exception) -> None:
-    for wire in (S7Wire("127.0.0.1", 102), ModbusWire("127.0.0.1", 502, 1)):
+    for wire in (_S7Wire("127.0.0.1", 102), _ModbusWire("127.0.0.1", 502, 1)):
         vars(wire)["_client"] = Broken(error)
         with pytest.raises(WireError, match=r"(S7|Modbus)"):
             wire.read(FROM_PLC)
@@ -286,4 +286,4 @@ def test_errors_of_a_library_are_reported_as_connection_errors(error: Exception)
 
 def test_a_missing_connection_is_reported() -> None:
     with pytest.raises(WireError, match=r"connection .*closed"):
-        S7Wire("127.0.0.1", 102).read(FROM_PLC)
+        _S7Wire("127.0.0.1", 102).read(FROM_PLC)

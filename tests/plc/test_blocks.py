@@ -14,7 +14,6 @@ from sagline.plc.blocks import (
     TO_PLC,
     TYPES,
     Block,
-    claim_block,
     command_blocks,
     sample_of,
 )
@@ -49,7 +48,7 @@ def test_bytes_of_a_command_and_a_claim_are_at_their_offsets() -> None:
     for winch, offset in ((6, 20), (7, 40)):
         expected = command.length[winch], command.rate[winch], command.tension[winch], int(command.enable[winch])
         assert struct.unpack_from(">dffI", data, offset) == expected
-    assert claim_block(77) == b"SAGC" + struct.pack(">I", 77)
+    assert CLAIM.pack({"owner": 77}) == b"SAGC" + struct.pack(">I", 77)
 
 
 @pytest.mark.parametrize("winches", [1, 2, 7, 8])

@@ -14,8 +14,8 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import Front, plot
-from sagline.plot.front import best_until
-from sagline.plot.workspace import FAR_SIDE, NEAR_SIDE, limit_colors, round_levels
+from sagline.plot.front import _best_until
+from sagline.plot.workspace import FAR_SIDE, NEAR_SIDE, _limit_colors, _round_levels
 from tests.kinematics.test_many_robots import planar
 from tests.refusal import refused
 from tests.tiers import extended
@@ -56,7 +56,7 @@ def test_regions_have_the_color_and_the_name_of_their_cable(space: sl.Workspace)
     mesh = next(each for each in ax.collections if isinstance(each, QuadMesh))
     names = [text for text in ax.texts if text.get_text().startswith("cable")]
     assert len(names) >= 4
-    colors = limit_colors(space)
+    colors = _limit_colors(space)
     for name in names:
         x, y = name.get_position()
         found = sl.margin(ROBOT, sl.Pose([x, y, 2.0], np.eye(3)), LOADS)
@@ -144,8 +144,8 @@ def test_a_planar_robot_is_drawn_as_a_slice() -> None:
 
 
 def test_round_levels_are_few_and_round() -> None:
-    assert round_levels(233.0).tolist() == [50.0, 100.0, 150.0, 200.0]
-    assert round_levels(0.0).size == round_levels(np.inf).size == 0
+    assert _round_levels(233.0).tolist() == [50.0, 100.0, 150.0, 200.0]
+    assert _round_levels(0.0).size == _round_levels(np.inf).size == 0
 
 
 def front_of(*kinds: str, count: int = 30) -> Front:
@@ -175,4 +175,6 @@ def test_a_search_with_one_goal_is_drawn_over_time() -> None:
     _, best, start = plot.front(found).axes[0].get_lines()
     assert np.asarray(best.get_ydata())[-1] == np.nanmax(found.evaluated_values)
     assert np.asarray(start.get_ydata())[0] == found.start_values[0]
-    np.testing.assert_array_equal(best_until(np.array([np.nan, 3.0, 1.0, 2.0]), highest=False), [np.nan, 3.0, 1.0, 1.0])
+    np.testing.assert_array_equal(
+        _best_until(np.array([np.nan, 3.0, 1.0, 2.0]), highest=False), [np.nan, 3.0, 1.0, 1.0]
+    )

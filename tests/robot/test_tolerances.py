@@ -10,7 +10,8 @@ from sagline.calibration.parameters import KINDS
 from sagline.robot.tolerances import UNCERTAIN, Provenance, value_of
 from tests.refusal import refused
 
-OUTSIDE = {"measuring_frame", "target"}  # kinds of unknowns that are not fields of a robot
+# kinds of unknowns that are not fields of a robot
+OUTSIDE = {"measuring_frame", "length_scale", "clock_offset", "target"}
 
 
 def four(**changes: Any) -> Robot:

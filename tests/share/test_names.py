@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.share.course import of_plan
+from sagline.share.course import SharedMotion
 from sagline.share.machine import robot_drawing
 from sagline.share.page import course_page, robot_page
 
@@ -58,7 +58,7 @@ def test_the_title_and_the_notes_of_a_run() -> None:
     robot = named()
     assert robot.test_box is not None
     poses = sl.Pose(np.stack([0.5 * (robot.test_box.low + robot.test_box.high)] * 2), np.eye(3))
-    course = of_plan(sl.inverse(robot, poses))
+    course = SharedMotion.of_plan(sl.inverse(robot, poses))
     object.__setattr__(course, "notes", (NAME,))
     found = Page(course_page(course, NAME))
     assert "blink" not in found.tags

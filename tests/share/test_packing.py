@@ -10,7 +10,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.share.course import MOST_RATE, of_plan
+from sagline.share.course import MOST_RATE, SharedMotion
 from sagline.share.packing import PackedColumn, encode_columns
 from sagline.share.page import course_page
 from tests.tiers import extended
@@ -67,7 +67,7 @@ def test_a_minute_of_run_is_small(name: str) -> None:
     wave = np.stack((np.cos(turn), np.sin(turn), np.cos(0.7 * turn)), axis=1)
     pose = sl.Pose(0.5 * (low + high) + 0.2 * wave * (high - low), np.eye(3))
     path = sl.path_from_samples(np.linspace(0.0, 60.0, 9001), pose)
-    course = of_plan(sl.inverse(robot, path))
+    course = SharedMotion.of_plan(sl.inverse(robot, path))
     assert len(course.time) == len(course.thinned().time) == 9001
     noise = np.exp(np.random.default_rng(1).normal(0.0, 0.01, course.tension.shape))
     object.__setattr__(course, "tension", course.tension * noise)
@@ -78,7 +78,7 @@ def test_a_minute_of_run_is_small(name: str) -> None:
 def test_faster_runs_are_thinned_with_a_note() -> None:
     robot = sl.load_robot("cogiro")
     ends = sl.Pose(np.array([[0.0, 0.0, 2.0], [1.0, 0.0, 2.0]]), np.stack([np.eye(3)] * 2))
-    course = of_plan(sl.inverse(robot, sl.quintic_path(ends, durations=[4.0], rate=1000)))
+    course = SharedMotion.of_plan(sl.inverse(robot, sl.quintic_path(ends, durations=[4.0], rate=1000)))
     kept = course.thinned()
     assert len(kept.time) == 4.0 * MOST_RATE + 1
     assert kept.time[-1] == course.time[-1]

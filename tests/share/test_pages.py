@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, expect
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.robot.reach import home_pose
-from sagline.share.course import of_plan
+from sagline.share.course import SharedMotion
 from sagline.share.page import LENGTH, POSITION, TENSION, TIME, TURN, course_page, robot_page
 from sagline.viewer import shapes
 from sagline.viewer.shapes import platform_solid
@@ -81,7 +81,7 @@ def test_a_run_plays(
     browser: Browser, tmp_path: Path, name: str, size: tuple[int, int], theme: Literal["light", "dark"]
 ) -> None:
     plan = run_of(name)
-    (tmp_path / "run.html").write_text(course_page(of_plan(plan), "run"), encoding="utf-8")
+    (tmp_path / "run.html").write_text(course_page(SharedMotion.of_plan(plan), "run"), encoding="utf-8")
     with opened(browser, tmp_path / "run.html", width=size[0], height=size[1], theme=theme) as page:
         check_states(plan, page)
         check_look(page)

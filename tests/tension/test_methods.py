@@ -33,7 +33,8 @@ from sagline import (
     tension_polygon,
     without_cables,
 )
-from sagline.tension.methods import METHODS
+from sagline.kernels import codes
+from sagline.tension.methods import methods_by_name
 from tests.refusal import refused
 from tests.tension.reference import nearest, needed, planar, random_poses, structure
 from tests.tiers import wide
@@ -395,7 +396,7 @@ def test_slsqp_agrees_with_p_norm() -> None:
     assert size(polygon.coordinates(found)) <= best.fun * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("method", METHODS.values())
+@pytest.mark.parametrize("method", methods_by_name().values())
 def test_an_infinite_lower_limit_is_infeasible(method: type[TensionMethod]) -> None:
     """(54) of the article requires an infinite tension of a level cable: a verdict for every method."""
     robot = load_robot("article-suspended").replace(tension_max=1e9)
@@ -451,3 +452,33 @@ def test_other_objects_than_robots_are_named(robot: Any, item: str, value: str) 
     allowed = "a Robot, or several in a list" if item == "robot" else "a Robot"
     with refused(item, value, allowed, kind=InvalidValueError):
         inverse(robot, Pose.from_euler([0.0, 0.0, 2.0], 0.0, 0.0, 0.0))
+
+
+class Own(TensionMethod):
+    """A method with any code and any preferences."""
+
+    code = codes.QUADRATIC_PROGRAM
+    rows: object = np.ones((2, 8))
+
+    def preference(self, cables: int) -> Any:
+        """Preferences that do not depend on the number of cables."""
+        return self.rows
+
+
+@pytest.mark.parametrize("code", [99, -1, codes.METHOD_COUNT, 0.5, None])
+def test_a_method_that_the_kernels_do_not_have_is_refused(code: object) -> None:
+    with refused("Other.code", str(code), f"0 to {codes.METHOD_COUNT - 1}", kind=InvalidValueError):
+        type("Other", (Own,), {"code": code})()
+    with refused("Other.code", "missing", kind=InvalidValueError):
+        type("Other", (TensionMethod,), {})()
+
+
+@pytest.mark.parametrize("rows", [np.ones((2, 7)), np.ones(8), np.ones((3, 8)), 1.0, "ab", None])
+def test_preferences_of_another_shape_are_refused(rows: object) -> None:
+    robot, pose = load_robot("cogiro"), Pose.from_euler([1.0, 0.5, 2.0], 0.0, 0.0, 0.0)
+    with refused("Other.preference", kind=InvalidValueError):
+        inverse(robot, pose, tension=type("Other", (Own,), {"rows": rows})())
+    mean = inverse(robot, pose, tension=type("Other", (Own,), {})())
+    np.testing.assert_array_equal(
+        mean.chord_tension, inverse(robot, pose, tension=QuadraticProgram(target=1.0)).chord_tension
+    )

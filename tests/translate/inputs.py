@@ -246,6 +246,8 @@ def entries() -> None:
     sl.inverse(slack, unstable, tension=sl.MinimumNorm())
     for radius in (None, 0.03):
         sl.inverse(suspended(4, radius=radius), places(4, 4))
+    slanted = sl.Winch(0.05, swivel_axis=[[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]] * 4, dead_cable=3.0)
+    there_and_back(sl.load_robot("cogiro").replace(winches=slanted), 4, 1)
     cables()
     winches()
     meshes()

@@ -14,7 +14,7 @@ import pytest
 import sagline as sl
 from sagline.control import Command, Mode, Sample
 from sagline.core.arrays import Array
-from sagline.twin.server import block_of, check_first_port
+from sagline.twin.server import _block_of, check_first_port
 from tests.control.protocol import GroupFault, GroupStatus
 from tests.plc.protocol import CLAIM, FROM_PLC, TO_PLC, BlockLink, Refusal
 from tests.plc.samples import a_sample, sample_blocks
@@ -96,12 +96,12 @@ def test_a_report_is_packed_as_in_a_plc() -> None:
     counter = int(sample.counter[1])
     rows: list[Any] = [counter, counter, False, float(sample.plc_time[1]), *heads, *floats, *whole]
     report = sl.twin.Report(*rows)
-    assert block_of(1, report) == sample_blocks(sample)[1]
+    assert _block_of(1, report) == sample_blocks(sample)[1]
     for spoiled, said in ((report._replace(counter_again=3), "torn"), (report._replace(foreign=True), "another")):
-        refusal = FROM_PLC.read(block_of(1, spoiled))
+        refusal = FROM_PLC.read(_block_of(1, spoiled))
         assert isinstance(refusal, Refusal)
         assert re.match(f"DB101 .*{said}", refusal.reason)
-    beyond = block_of(1, report._replace(counts=[2**31, -(2**31) - 1]))
+    beyond = _block_of(1, report._replace(counts=[2**31, -(2**31) - 1]))
     values = FROM_PLC.read(beyond)
     assert isinstance(values, dict)
     assert [values["winch[1].counts"], values["winch[2].counts"]] == [-(2**31), 2**31 - 1]

@@ -29,7 +29,8 @@ def browser() -> Iterator[Browser]:
 
 def in_full(show: RegionFeature) -> bool:
     """True if the drawn region is that of the shown state and not a coarse one."""
-    return show._result is not None and not show._result[1] and show._result[0] == show._key
+    known, rough, _ = show._result
+    return not rough and known == show._key
 
 
 def slide(page: Page, label: str, way: float) -> None:

@@ -18,7 +18,7 @@ from sagline.viewer.features import calibration as feature
 from sagline.viewer.features.calibration import FIELD
 from sagline.viewer.page import Page
 from sagline.viewer.panel import written_mass
-from sagline.viewer.shapes import Ellipsoids, ball, readable
+from sagline.viewer.shapes import ball, error_ellipsoids, placed_balls, readable
 from tests.calibration.made_up import made_up, parameters
 from tests.tiers import extended
 from tests.viewer.client import Client, await_that
@@ -58,18 +58,17 @@ def test_an_ellipsoid_is_its_covariance(seed: int) -> None:
     roots = random.standard_normal((6, 3, 3)) * 10.0 ** random.uniform(-5.0, 0.0, (6, 1, 1))
     covariance = roots @ np.swapaxes(roots, 1, 2)
     covariance[2], covariance[4, 1, 1] = 0.0, np.inf
-    points = random.standard_normal((6, 3))
-    some = Ellipsoids.of(points, covariance)
-    np.testing.assert_array_equal(some.which, [0, 1, 3, 5])
-    np.testing.assert_array_equal(some.middle, points[some.which])
-    axes = Rotation.from_quat(some.turn[:, [1, 2, 3, 0]]).as_matrix()
-    again = axes @ (some.radius[..., None] ** 2 * np.swapaxes(axes, 1, 2))
-    scale = np.abs(covariance[some.which]).max(axis=(1, 2), keepdims=True)
-    np.testing.assert_allclose(again / scale, covariance[some.which] / scale, atol=1e-12)
-    largest = some.radius.max(axis=1)
-    np.testing.assert_allclose(some.drawn(50.0).max(axis=1), 50.0 * largest)
-    assert (some.drawn(50.0).min(axis=1) >= 0.03 * 50.0 * largest * (1.0 - 1e-12)).all()
-    factor = readable(some.radius, 0.4)
+    known, errors, directions = error_ellipsoids(covariance)
+    np.testing.assert_array_equal(known, [0, 1, 3, 5])
+    turns, radii = placed_balls(errors, directions)
+    axes = Rotation.from_quat(turns[:, [1, 2, 3, 0]]).as_matrix()
+    again = axes @ (errors[..., None] ** 2 * np.swapaxes(axes, 1, 2))
+    scale = np.abs(covariance[known]).max(axis=(1, 2), keepdims=True)
+    np.testing.assert_allclose(again / scale, covariance[known] / scale, atol=1e-12)
+    largest = errors.max(axis=1)
+    np.testing.assert_allclose(radii.max(axis=1), largest)
+    assert (radii.min(axis=1) >= 0.03 * largest * (1.0 - 1e-12)).all()
+    factor = readable(errors, 0.4)
     assert factor == 1.0 or 0.4 / 2.5 <= factor * largest.max() <= 0.4 * (1.0 + 1e-9)
 
 

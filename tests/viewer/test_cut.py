@@ -10,6 +10,7 @@ import pytest
 from viser import CameraHandle
 
 import sagline as sl
+from sagline.viewer import shapes
 from sagline.viewer.camera import Camera
 from sagline.viewer.features import FEATURES, cut
 from sagline.viewer.features.cut import CutFeature
@@ -192,3 +193,21 @@ def test_the_previous_run_is_restored_at_its_time() -> None:
     player.play(PlayedSimulation(made.simulation(50)), at_once=True)
     player.restore(kept)
     assert (player.time, player.playing, player.following) == (0.7, False, False)
+
+
+def test_the_pieces_of_a_cut_cable_with_mass_are_drawn() -> None:
+    """Up to their free ends, with a gap between them, and without NaN in the segments of the page."""
+    state = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0.0, 0.0, 2.0), np.eye(3))).state
+    torn = sl.Break(1, 0.0, position=0.5)
+    simulation = sl.simulate(state, duration=0.2, cable_mass="lumped", nodes=8, events=torn)
+    assert simulation.nodes is not None
+    nodes = simulation.nodes[-1, 1]
+    (gap,) = np.flatnonzero(np.isnan(nodes[:, 0]))
+    course = PlayedSimulation(simulation).at(0.2).courses(1.0)[1]
+    empty = np.isnan(course[:, 0])
+    assert course[:-1][empty[1:] & ~empty[:-1]] == pytest.approx(nodes[[gap - 1]])
+    assert course[1:][empty[:-1] & ~empty[1:]] == pytest.approx(nodes[[gap + 1]])
+    drawn = shapes.segments(course[None], dashed=False)
+    assert np.isfinite(drawn).all()
+    lengths = np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1)
+    assert lengths.max() < 0.5 * np.linalg.norm(nodes[gap + 1] - nodes[gap - 1])

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 import sagline as sl
+from sagline.viewer.camera import Camera
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.export import ExportFeature, Shot, moments
 from sagline.viewer.page import Page
@@ -170,26 +171,32 @@ def test_an_invalid_camera_gets_no_picture(film: Shown, camera: dict[str, Any]) 
 def test_a_picture_shows_the_view_of_the_window(film: Shown) -> None:
     """A camera 10 m before a box 2 m deep: nearest face at 9 m, slopes 3/9 and 1/9 of its half width and height."""
 
-    class Camera:
+    class Seen:
         wxyz = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])  # looks along y, z is up
         position = np.array([0.0, -10.0, 0.0])
-        fov, aspect = 1.0, 0.5
+        fov, image_width, image_height = 1.0, 500.0, 1000.0
 
     low, high = np.array([-3.0, -1.0, -1.0]), np.array([3.0, 1.0, 1.0])
-    camera: Any = Camera()
-    camera.aspect = 4.0
-    shot = Shot.of(camera, low, high, 1200)
+    seen: Any = Seen()
+
+    def shot_of(*arguments: Any) -> Shot:
+        camera = Camera.of(seen)
+        assert camera is not None
+        return Shot.of(camera, *arguments)
+
+    seen.image_width = 4000.0
+    shot = shot_of(low, high, 1200)
     assert (shot.width, shot.height) == (1200, 500)  # no flatter than 2.4 : 1
     assert np.tan(shot.field / 2.0) == pytest.approx(1.06 * (3.0 / 9.0) / 2.4)
     assert shot.pixel == pytest.approx(2.0 * 10.0 * np.tan(shot.field / 2.0) / shot.height)
-    camera.aspect = 0.5  # a narrow window shows less of it
-    narrow = Shot.of(camera, low, high, 1000, 500)
+    seen.image_width = 500.0  # a narrow window shows less of it
+    narrow = shot_of(low, high, 1000, 500)
     assert np.tan(narrow.field / 2.0) == pytest.approx(1.06 * 0.5 * np.tan(0.5) / 2.0)
-    camera.aspect = 4.0  # viser draws nothing beyond 1000 m: the camera goes to where 950 are enough
-    camera.position = np.array([0.0, -1000.0, 0.0])
-    large = Shot.of(camera, 100.0 * low, 100.0 * high, 1000, 1000)
+    seen.image_width = 4000.0  # viser draws nothing beyond 1000 m: the camera goes to where 950 are enough
+    seen.position = np.array([0.0, -1000.0, 0.0])
+    large = shot_of(100.0 * low, 100.0 * high, 1000, 1000)
     assert large.forward == pytest.approx(1100.0 - 950.0)
     assert np.tan(large.field / 2.0) == pytest.approx(1.06 * 300.0 / 750.0)
-    camera.aspect = 0.5
-    camera.position = np.zeros(3)  # within the box
-    assert np.tan(Shot.of(camera, low, high, 1000, 1000).field / 2.0) == pytest.approx(1.06 * np.tan(0.5))
+    seen.image_width = 500.0
+    seen.position = np.zeros(3)  # within the box
+    assert np.tan(shot_of(low, high, 1000, 1000).field / 2.0) == pytest.approx(1.06 * np.tan(0.5))

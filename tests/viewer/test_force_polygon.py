@@ -52,11 +52,11 @@ def test_forces_close_with_weight_and_load() -> None:
     scale = float(state.chord_tension.max())
     assert force < 1e-9 * scale
     assert moment < 1e-9 * scale
-    np.testing.assert_allclose(pulls[-1].force, LOAD[:3])
-    np.testing.assert_allclose(pulls[-1].moment, LOAD[3:])
+    np.testing.assert_allclose(pulls[-1].wrench[:3], LOAD[:3])
+    np.testing.assert_allclose(pulls[-1].wrench[3:], LOAD[3:])
     center = state.pose.transform(HEAVY.center_of_mass)
     for each in pulls[:-2]:
-        assert each.moment == pytest.approx(np.cross(each.at - center, each.force))
+        assert each.wrench[3:] == pytest.approx(np.cross(each.at - center, each.wrench[:3]))
     away = forces_on_platform(state)[:-1]  # without the load they do not
     assert residual(state, away) == pytest.approx((np.linalg.norm(LOAD[:3]), np.linalg.norm(LOAD[3:])), rel=1e-6)
 
@@ -79,7 +79,7 @@ def test_arrows_are_head_to_tail_with_the_lengths_of_forces() -> None:
     named = re.findall(r'aria-label="forces on the platform head to tail, (\w) to the right, (\w) up"', html)
     for view, names in zip(views, named, strict=True):
         axes = ["xyz".index(name) for name in names]
-        forces = np.array([each.force[axes] for each in pulls])
+        forces = np.array([each.wrench[axes] for each in pulls])
         forces = forces[np.linalg.norm(forces, axis=1) > 1e-9]  # the weight, from above
         scale = np.linalg.norm(view[:, 1] - view[:, 0]) / np.linalg.norm(forces)
         np.testing.assert_allclose(view[1:, 0], view[:-1, 1], atol=0.11)
@@ -126,7 +126,7 @@ def test_the_largest_force_has_three_digits_at_least(name: str) -> None:
     state = sl.inverse(robot, home_pose(robot)).state
     rows = re.findall(ROW, force_polygon_figure(state))
     forces = np.array([[float(cell) for cell in re.findall(r"<td>([^<]*)</td>", cells)][:3] for _, cells in rows])
-    expected = np.array([each.force for each in sorted(forces_on_platform(state), key=lambda each: each.name)])
+    expected = np.array([each.wrench[:3] for each in sorted(forces_on_platform(state), key=lambda each: each.name)])
     expected /= force_unit(robot).newtons
     np.testing.assert_allclose(forces, expected, rtol=0.0, atol=6e-4 * np.abs(expected).max())
 
@@ -139,7 +139,7 @@ def test_the_gap_is_the_missing_force() -> None:
     pulls = forces_on_platform(missing.state, missing.wrench)
     assert [each.name for each in pulls][-2:] == ["weight", "missing"]
     others = pulled(missing.state).sum(axis=0) - np.array([0.0, 0.0, robot.mass * robot.gravity])
-    np.testing.assert_allclose(pulls[-1].force, -others, atol=1e-6 * missing.state.chord_tension.max())
+    np.testing.assert_allclose(pulls[-1].wrench[:3], -others, atol=1e-6 * missing.state.chord_tension.max())
     html = force_polygon_figure(missing.state, missing.wrench)
     assert 'class="gap"' in html
     told = re.search(r"The gap is the missing force, ([\d.]+).(k?)N", html)
@@ -195,7 +195,7 @@ def test_arrows_in_the_scene_are_shown_and_hidden(page: Shown) -> None:
         assert view is not None
         assert isinstance(view.snapshot.robot, sl.Robot)
         state = view.snapshot.plan.state  # type: ignore[union-attr]
-        forces = np.array([each.force for each in forces_on_platform(state)])
+        forces = np.array([each.wrench[:3] for each in forces_on_platform(state)])
         scale = np.linalg.norm(points[:, 1] - points[:, 0]) / np.linalg.norm(forces)
         np.testing.assert_allclose(points[:, 1] - points[:, 0], scale * forces, atol=1e-5)
         center = view.snapshot.pose.transform(view.snapshot.robot.center_of_mass)

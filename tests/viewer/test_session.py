@@ -141,7 +141,6 @@ def test_the_page_shows_three_platforms_and_follows_the_log(tmp_path: Path, trut
         grown = follower.more()
         assert grown is not None
         viewer.extend(grown)
-        viewer._work_off()
         viewer._update()
         assert viewer.view.snapshot.index == 200  # who looked at the end sees the new end
         assert viewer.player.time == pytest.approx(2.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.tension.margin import cable_margins
 from sagline.viewer.readout import legend
 from sagline.viewer.robot_scene import cable_colors, cable_segments, chord_segments, scaled_position
 from sagline.viewer.snapshot import Settings, snapshot_at
@@ -20,7 +21,8 @@ def test_snapshot_shows_the_plan_of_its_pose() -> None:
     assert snapshot.reason == ""
     assert np.array_equal(snapshot.tension, plan.chord_tension)
     low, high = plan.chord_tension - 25.0, 2000.0 - plan.chord_tension
-    assert np.array_equal(snapshot.margin, np.minimum(low, high))
+    assert snapshot.plan is not None
+    assert np.array_equal(cable_margins(snapshot.plan.state), np.minimum(low, high))
     assert snapshot.rest is None
 
 
@@ -30,8 +32,10 @@ def test_margins_are_those_of_the_limited_tension() -> None:
     plan = sl.inverse(robot, HERE)
     weight = robot.cables.linear_density * 9.81 * plan.unstrained_length
     winch = np.hypot(plan.horizontal_tension, plan.vertical_force - weight)
-    assert snapshot.margin == pytest.approx(np.minimum(winch - 25.0, 2000.0 - winch), rel=1e-12)
-    assert snapshot.margin.min() == pytest.approx(float(sl.limit_margin(plan.state)), rel=1e-12)
+    assert snapshot.plan is not None
+    margin = cable_margins(snapshot.plan.state)
+    assert margin == pytest.approx(np.minimum(winch - 25.0, 2000.0 - winch), rel=1e-12)
+    assert margin.min() == pytest.approx(float(sl.limit_margin(plan.state)), rel=1e-12)
     assert np.abs(winch - plan.chord_tension).min() > 0.5  # the chord tensions would be seen
 
 

@@ -8,12 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Flags
 from sagline.workspaces.surface import normals_of
 from sagline.workspaces.workspace import BY_BOX
 
 BLOCK = 20_000  # positions per call
 ASIDE = 1e-3  # [m], distance of the verdicts from the boundary
+OPEN = 0.01  # target: largest share of open positions
+RIGHT = 0.999  # target: least share of vertices without a wrong verdict
+STEP = 1e-6  # [m], first distance and distances of the verdicts that find a gap outside the boundary
+ROUNDING = 1e-5  # a margin of less than this share of the weight has no sign
 PRESETS = ("article-suspended", "article-mixed", "cogiro", "ipanema-1", "ipanema-3")
 
 
@@ -26,7 +30,9 @@ class Compared(NamedTuple):
     borderline: float  # volume of the positions without a verdict [m^3]
     open: float  # share of positions whose margin is open
     contradictions: int  # positions at which the status of the margin contradicts the verdict
-    right: float  # share of vertices with the right verdicts inside and outside
+    wrong_sign: int  # positions with an open margin whose value has the sign that contradicts the verdict
+    right: float  # share of vertices without a wrong verdict inside or outside
+    before_gap: float  # share of vertices before a gap in which the inverse has no verdict and the margin is negative
 
     @property
     def away(self) -> float:
@@ -68,30 +74,50 @@ def compared(robot: sl.Robot, count: int, cells: int, rng: np.random.Generator) 
     """Compare a workspace with the verdicts at random positions in its box, and beside its vertices."""
     space = sl.workspace(robot, cells=cells)
     size = float(np.prod(space.box.high - space.box.low))
-    held = unknown = unsure = wrong = 0
+    rounding = ROUNDING * robot.mass * robot.gravity
+    held = unknown = unsure = wrong = wrong_sign = 0
     for first in range(0, count, BLOCK):
         poses = poses_at(rng.uniform(space.box.low, space.box.high, (min(BLOCK, count - first), 3)))
-        plan, status = sl.inverse(robot, poses), sl.margin(robot, poses).status
+        plan, margin = sl.inverse(robot, poses), sl.margin(robot, poses)
+        infeasible, is_open = plan.status == sl.PoseStatus.INFEASIBLE, margin.status == sl.MarginStatus.OPEN
         held += int(np.count_nonzero(plan.feasible))
         unknown += int(np.count_nonzero(plan.status == sl.PoseStatus.BORDERLINE))
-        unsure += int(np.count_nonzero(status == sl.MarginStatus.OPEN))
-        wrong += int(np.count_nonzero((status == sl.MarginStatus.FEASIBLE) & (plan.status == sl.PoseStatus.INFEASIBLE)))
-        wrong += int(np.count_nonzero((status == sl.MarginStatus.INFEASIBLE) & plan.feasible))
+        unsure += int(np.count_nonzero(is_open))
+        wrong_sign += int(np.count_nonzero(is_open & plan.feasible & (margin.value < -rounding)))
+        wrong_sign += int(np.count_nonzero(is_open & infeasible & (margin.value > rounding)))
+        wrong += int(np.count_nonzero((margin.status == sl.MarginStatus.FEASIBLE) & infeasible))
+        wrong += int(np.count_nonzero((margin.status == sl.MarginStatus.INFEASIBLE) & plan.feasible))
     share = held / count
     deviation = float(size * np.sqrt(share * (1.0 - share) / count))
-    right = _right_vertices(robot, space)
-    return Compared(space, size * share, deviation, size * unknown / count, unsure / count, wrong, right)
+    counted = (unsure / count, wrong, wrong_sign, *_right_vertices(robot, space))
+    return Compared(space, size * share, deviation, size * unknown / count, *counted)
 
 
-def _right_vertices(robot: sl.Robot, space: sl.Workspace) -> float:
-    """Share of vertices inside the box without a wrong verdict on either side."""
+def _right_vertices(robot: sl.Robot, space: sl.Workspace) -> tuple[float, float]:
+    """Shares of vertices inside the box without a wrong verdict on either side, and before a gap without a verdict."""
     vertices, faces = space.surface.vertices, space.surface.faces
     by_box = np.unique(faces[(space.limiting[faces] == BY_BOX).any(axis=1)])
     free = np.setdiff1d(np.arange(len(vertices)), by_box)
     areas = normals_of(vertices, faces)
     normals = np.stack([np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices)) for part in areas.T], axis=1)
     normals = normals[free] / np.linalg.norm(normals[free], axis=1)[:, None]
-    inside = sl.inverse(robot, poses_at(vertices[free] - ASIDE * normals)).status
-    outside = sl.inverse(robot, poses_at(vertices[free] + ASIDE * normals)).status
-    wrong = (inside == sl.PoseStatus.INFEASIBLE) | (outside == sl.PoseStatus.SOLVED)
-    return 1.0 - float(np.mean(wrong))
+    middle = vertices[free]
+    wrong = sl.inverse(robot, poses_at(middle - ASIDE * normals)).status == sl.PoseStatus.INFEASIBLE
+    again = np.flatnonzero(sl.inverse(robot, poses_at(middle + ASIDE * normals)).feasible)
+    proved, likely = _gap_begins(robot, middle[again], normals[again])
+    wrong[again] |= ~(proved | likely)
+    return 1.0 - float(np.mean(wrong)), float(np.count_nonzero(likely) / len(free))
+
+
+def _gap_begins(robot: sl.Robot, vertices: Array, normals: Array) -> tuple[Flags, Flags]:
+    """Masks (N,) of vertices with a gap 1 µm to 0.1 mm outside: proved, or with a negative margin but no verdict.
+
+    These vertices are on the boundary even if a feasible part of the box begins again within 1 mm.
+    """
+    line = vertices[:, None] + np.arange(STEP, 0.1 * ASIDE + 0.5 * STEP, STEP)[:, None] * normals[:, None]
+    poses = poses_at(line.reshape(-1, 3))
+    status = sl.inverse(robot, poses).status.reshape(line.shape[:2])
+    negative = sl.margin(robot, poses).value.reshape(line.shape[:2]) < 0.0
+    proved = (status == sl.PoseStatus.INFEASIBLE).any(axis=1)
+    likely = ((status == sl.PoseStatus.BORDERLINE) & negative).any(axis=1)
+    return proved, likely & ~proved

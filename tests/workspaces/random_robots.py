@@ -92,16 +92,18 @@ def has_pulleys(robot: sl.Robot) -> bool:
 
 
 def beyond_limits(robot: sl.Robot, plan: sl.Plan) -> Flags:
-    """Mask (N,) of solved poses with a tension that is not admissible."""
+    """Mask (N,) of solved poses with a tension or an exit point that is not admissible."""
     limited, tau = plan.state.limited_tension, plan.state.chord_tension
     rounding = WITHIN * robot.mass * 9.81
-    wrong = limited < robot.tension_min * (1.0 - WITHIN) - rounding
+    wrong = ~(limited >= robot.tension_min * (1.0 - WITHIN) - rounding)  # also without a value
     wrong |= limited > robot.tension_max * (1.0 + WITHIN) + rounding
     wrong |= np.isinf(robot.tension_max) & (tau > robot.cables.axial_stiffness * (1.0 + WITHIN))
     if not has_pulleys(robot):
         chord = np.hypot(plan.state.cables.span, plan.state.cables.rise)
         half_weight = 0.5 * robot.cables.linear_density * robot.gravity * chord
         wrong |= half_weight > LOOSEST * tau * (1.0 + WITHIN) + rounding
+    else:
+        wrong |= ~(plan.state.cables.span > 0.0)  # the cable leaves its pulley beyond the platform end
     return np.asarray(wrong.any(axis=-1) & (plan.status == Pose.SOLVED))
 
 
@@ -237,10 +239,12 @@ def _compare_design(case: Case, found: Counter[str]) -> None:
     poses = case.poses[(case.margin.status == Margin.FEASIBLE) & clear]
     if not len(poses):
         return
+    plan = sl.inverse(case.robot, poses, tension=sl.MinimumNorm(), wrench=case.wrench, stability=False)
+    if not plan.feasible.any():  # all without a verdict; design then refuses the poses
+        return
     raised = sl.FreeAnchors("frame", -0.01, 0.01, along=[0, 0, 1], symmetry="together")
     goals = ["workspace_share", "largest_tension"]
     front = sl.design(case.robot, [raised], goals, case.loads, poses, evaluations=16)
-    plan = sl.inverse(case.robot, poses, tension=sl.MinimumNorm(), wrench=case.wrench, stability=False)
     found["design without feasible poses"] += int(front.start_values[0] < 1.0)
-    largest = plan.state.chord_tension.max()
+    largest = plan.state.chord_tension[plan.feasible].max()
     found["design with other tensions"] += int(not np.isclose(front.start_values[1], largest, rtol=1e-9))

@@ -21,11 +21,15 @@ def of_random_robots(seed: int, robots: int, poses: int) -> Counter[str]:
 
 
 @pytest.mark.parametrize(
-    ("robots", "poses"),
-    [(6, 15), pytest.param(60, 50, marks=extended), pytest.param(2600, 100, marks=pytest.mark.soak)],
+    ("seed", "robots", "poses"),
+    [
+        (1, 6, 15),
+        pytest.param(1, 60, 50, marks=extended),
+        *(pytest.param(seed, 325, 100, marks=pytest.mark.soak) for seed in range(1, 9)),
+    ],
 )
-def test_five_functions_agree(robots: int, poses: int) -> None:
-    found = of_random_robots(1, robots, poses)
+def test_five_functions_agree(seed: int, robots: int, poses: int) -> None:
+    found = of_random_robots(seed, robots, poses)
     print(dict(found))
     assert {name: count for name, count in found.items() if name not in COUNTED} == {}
     assert found["poses"] > 3.8 * robots * poses

@@ -63,7 +63,12 @@ def test_every_vertex_is_on_the_boundary(suspended: sl.Workspace) -> None:
     free = suspended.limiting != BY_BOX
     weight = SUSPENDED.mass * SUSPENDED.gravity
     assert np.count_nonzero(free) > 8_000
-    assert np.abs(suspended.margin[free]).max() <= 1e-5 * weight  # error bound of a margin on the exact curves
+    jumps = free & (np.abs(suspended.margin) > 1e-5 * weight)  # error bound of a margin on the exact curves
+    assert np.count_nonzero(jumps) <= 4
+    micrometer = 1e-6 * np.concatenate([np.eye(3), -np.eye(3)])  # the verdict changes within this distance of a jump
+    beside = (suspended.surface.vertices[jumps][:, None] + micrometer).reshape(-1, 3)
+    feasible = sl.inverse(SUSPENDED, sl.Pose(beside, np.eye(3))).feasible.reshape(-1, 6)
+    assert (feasible.any(axis=1) & ~feasible.all(axis=1)).all()
     assert np.quantile(np.abs(suspended.margin[free]), 0.95) <= 1e-8 * weight
     found = sl.margin(SUSPENDED, sl.Pose(suspended.surface.vertices, np.eye(3)))
     assert np.array_equal(found.value, suspended.margin)

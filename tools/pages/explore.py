@@ -15,7 +15,7 @@ import numpy as np
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel, CableState
 from sagline.cables.models import Catenary, Empirical
-from sagline.kernels.cable.batch import BUFFERS, CHUNK
+from sagline.kernels.tables import BUFFERS, CHUNK
 from sagline.share.packing import Call, described_calls, module_text
 
 KERNELS: Final = Path(__file__).parents[2] / "src/sagline/share/page/kernels.js"

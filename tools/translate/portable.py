@@ -10,7 +10,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import FunctionType
@@ -18,7 +18,6 @@ from typing import Any, Final
 
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.forward.platform import FORWARD_NUMBERS, LAST_COLUMNS
 from tools.translate import signatures as s
 from tools.translate.bounds import Bounds
 from tools.translate.extents import (
@@ -59,7 +58,7 @@ SINGLE: Final = {
     "algebra.programs.PIVOT": 1e-5,
     "algebra.programs.ROUNDING": 2e-7,
     "algebra.programs.DEPENDENT": 1e-5,
-    "statics.SHORTEST_CHORD": 1e-6,
+    "tables.SHORTEST_CHORD": 1e-6,
     "cable.states.SMALLEST": 1e-30,
     "cable.models.SMALL_HALLEY_STEP": 1e-4,
     "cable.models.SMALL_NEWTON_STEP": 1e-4,
@@ -85,6 +84,7 @@ SINGLE: Final = {
     "tension.other_methods.DEPENDENT": 1e-5,
     "tension.polygon.FLAT": 1e-6,
 }
+OMITTED: Final = {"tables.SWIVELS": False}  # code that no exported source needs
 ENTRIES: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (
     ("inverse_poses", "inverse_nearest", (*INVERSE, NONE, NONE, *ANSWERS)),
     ("inverse_poses", "inverse_by_method", (*INVERSE, s.BOOL, NONE, *ANSWERS)),
@@ -106,17 +106,17 @@ def parts() -> Iterator[tuple[list[str], str]]:
 
 
 @contextmanager
-def single_constants() -> Iterator[None]:
-    """The constants of the kernels for single precision, in all modules that use them."""
+def constants(values: Mapping[str, float]) -> Iterator[None]:
+    """Other values of constants of the kernels, in all modules that use them."""
     s.functions()
     places = [module for name, module in sys.modules.items() if name.startswith(KERNELS)]
-    old = {key: getattr(sys.modules[KERNELS + key.rpartition(".")[0]], key.rpartition(".")[2]) for key in SINGLE}
+    old = {key: getattr(sys.modules[KERNELS + key.rpartition(".")[0]], key.rpartition(".")[2]) for key in values}
     uses = [
         (module, key) for key, value in old.items() for module in places
         if vars(module).get(key.rpartition(".")[2]) is value
     ]  # fmt: skip
     for module, key in uses:
-        setattr(module, key.rpartition(".")[2], SINGLE[key])
+        setattr(module, key.rpartition(".")[2], values[key])
     try:
         yield
     finally:
@@ -147,9 +147,9 @@ def bounds() -> dict[str, dict[int, dict[str, Terms]]]:
     codes_, results = Array((one, cables), False), _floats(exactly(tables.RESULT_ROWS), one, cables)
     answers = _record(results, codes_, _floats(one, exactly(2)), _floats(one, free), Array((one,), False))
     model, limits = (exactly(codes.CATENARY), FLOAT, FLOAT), _record(Int(), FLOAT)
-    chain = _record(_floats(exactly(CABLE_ROWS), cables), _floats(free, free), _floats(exactly(LAST_COLUMNS)))
+    chain = _record(_floats(exactly(CABLE_ROWS), cables), _floats(free, free), _floats(exactly(tables.LAST_COLUMNS)))
     samples = _record(*robot, _floats(one, cables), pose, wrench)
-    found = _record(pose, results, codes_, _floats(one, exactly(FORWARD_NUMBERS)), Array((one,), False))
+    found = _record(pose, results, codes_, _floats(one, exactly(tables.FORWARD_NUMBERS)), Array((one,), False))
     inverse, forward = s.functions()["inverse_poses"], s.functions()["forward_poses"]
     every: dict[str, dict[int, dict[str, Terms]]] = {}
     for symbol, last, otherwise in (("inverse_nearest", 2, NOTHING), ("inverse_by_method", 11, FLAG)):
@@ -196,8 +196,9 @@ def _record(*items: Value) -> Record:
 
 def build(root: Path) -> None:
     """Write the data of the package below a source tree."""
-    double = list(parts())
-    with single_constants():
+    with constants(OMITTED):
+        double = list(parts())
+    with constants({**SINGLE, **OMITTED}):
         single = [(names, in_single(text)) for names, text in parts()]
     found: dict[str, Any] = {
         name: [(names, text.replace("int64_t", "int32_t")) for names, text in part]

@@ -70,6 +70,7 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
         "pulleys": (FORWARD_PULLEYS, GIVEN, MEMORY, F3, F4, F4, F3),
     },
     "dynamic_stiffnesses": {"": (F3, F3, FLOAT, F2, F4, I4), "damped": (F3, C3, FLOAT, C2, C4, I4)},
+    "exits_of_forces": {"": (F3, F1, F3, F3)},
     "fill_routing_compliance": {"": (TERMS, F3, F2, F2, F2, F3)},
     "fit_poses": {"": (BOOL, GIVEN, CHAIN, MEMORY, FOUND)},
     "follow_memory": {"": (F2, F2, F1, BOOL, F2, F2)},

@@ -1,4 +1,4 @@
-"""The studies of the article, computed again; a module has a study (functions of numbers) or a chapter of the page."""
+"""The studies of the article, computed again. A module contains a study, or a chapter of the page about a study."""
 
 from sagline.core.surface import group
 

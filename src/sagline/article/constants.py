@@ -1,9 +1,9 @@
-"""Chapters about figures 6 to 15, and about the dependence of the constants on the sampled tensions."""
+"""Chapters about figures 6 to 15, and about the effect of the sampled tensions on the fitted constants."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -11,11 +11,8 @@ from sagline.article.drawing import (
     Drawings,
     axes,
     chapter,
-    course_panels,
-    draw_courses,
     finding,
     shades,
-    with_fit,
 )
 from sagline.article.regressions import (
     ANGLE,
@@ -27,30 +24,26 @@ from sagline.article.regressions import (
     End,
     InterceptStudy,
     SagStudy,
-    StretchStudy,
-    angle_shape,
-    chord_shape,
     constants,
-    density_shape,
     intercept_studies,
-    length_shape,
     published_range,
     published_sampling,
     sag_study,
     simulated_cable,
     stretch_study,
 )
+from sagline.cables.model import CableState
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, PURPLE, VERMILLION
-from sagline.present.page import Chapter, Finding, table_of
+from sagline.present.page import Chapter, Finding, Panel, table_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MIDDLE, DENSE = 2, -1  # indices of the article's angle of 0.754 rad and of the largest density among the samples
-LOWEST = np.geomspace(40.0, 800.0, 12)  # lowest sampled tensions [N]
-HIGHEST = np.geomspace(300.0, 40_000.0, 12)  # highest sampled tensions [N]
+MIDDLE, DENSE = 2, -1  # indices of the angle 0.754 rad and of the largest density among the samples
+LOWEST = np.geomspace(40.0, 800.0, 12)  # values of the lowest sampled tension [N]
+HIGHEST = np.geomspace(300.0, 40_000.0, 12)  # values of the highest sampled tension [N]
 FACTORS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 
 
@@ -206,20 +199,20 @@ def _bend(chords: Array, intercept: Array, h_b: Array) -> float:
 
 CHORD = 10.0  # [m]
 TENSIONS = np.linspace(10.0, 500.0, 150)  # [N]
-PICKED = (1, 3, 5, 7)  # indices of drawn chords
-DRAWN = (1, 3, 5, 7, 9)  # indices of drawn densities
+PICKED = (1, 3, 5, 7)  # indices of the chords that are drawn
+DRAWN = (1, 3, 5, 7, 9)  # indices of the densities that are drawn
 
 
 def sag_chapter() -> Chapter:
     """Chapter about the regressions that lead from the adjusting length to k_p."""
     end = End.at_angle(CHORD)
-    stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
-    draw = Drawings("sag")
+    stiff, soft, printed, right = stretch_study(simulated_cable(), end, TENSIONS)
+    sag, draw = sag_study(published_sampling()), Drawings("sag")
     return chapter(
         "sag",
         (
-            _with_stretch(stretch, draw),
-            _relieved(stretch, draw),
+            _with_stretch(stiff, soft, draw),
+            _relieved(stiff, printed, right, draw),
             _tension(sag, draw),
             _chord(sag, draw),
             _angle(sag, draw),
@@ -229,33 +222,34 @@ def sag_chapter() -> Chapter:
     )
 
 
-def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
+def _with_stretch(stiff: CableState, soft: CableState, draw: Drawings) -> Finding:
     figure, ax = axes("$T_x$ [N]", "$d$ [mm]")
-    ax.plot(study.tensions, 1e3 * study.unstretchable, color=BLUE, linewidth=1.3, label="does not stretch")
-    ax.plot(study.tensions, 1e3 * study.stretchable, color=VERMILLION, linewidth=1.3, label="stretches")
+    ax.plot(stiff.horizontal_tension, 1e3 * stiff.adjusting_length, color=BLUE, linewidth=1.3, label="does not stretch")
+    ax.plot(stiff.horizontal_tension, 1e3 * soft.adjusting_length, color=VERMILLION, linewidth=1.3, label="stretches")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    hooke = study.magnitude[-1] * CHORD / float(simulated_cable().axial_stiffness)
+    hooke = stiff.platform_end_tension[-1] * CHORD / float(simulated_cable().axial_stiffness)
     numbers = {
-        "least_unstretchable_m": study.unstretchable.min(),
-        "last_stretchable_m": study.stretchable[-1],
-        "share_of_hooke": -study.stretchable[-1] / hooke,
+        "least_unstretchable_m": stiff.adjusting_length.min(),
+        "last_stretchable_m": soft.adjusting_length[-1],
+        "share_of_hooke": -soft.adjusting_length[-1] / hooke,
     }
     return finding(
         "d-over-tension", numbers=numbers, panels=(draw.panel(figure, "Adjusting length as a function of T_x."),)
     )
 
 
-def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
-    printed = 1e3 * (study.relieved - study.unstretchable)
-    mended = 1e3 * (study.relieved_exactly - study.unstretchable)
-    numbers = {"error_of_36_mm": np.abs(printed).max(), "error_with_mean_tension_mm": np.abs(mended).max()}
+def _relieved(stiff: CableState, printed: Array, right: Array, draw: Drawings) -> Finding:
+    """Finding about lengths [m] without elongation: `printed` by (36) and (38), `right` by the mean tension."""
+    force, length = stiff.platform_end_tension, stiff.adjusting_length
+    off, left = (1e3 * (each - length) for each in (printed, right))
+    numbers = {"error_of_36_mm": np.abs(off).max(), "error_with_mean_tension_mm": np.abs(left).max()}
     figure, ax = axes("$|T|$ [N]", "$d$ [mm]")
-    ax.plot(study.magnitude, 1e3 * study.unstretchable, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
-    ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="without stretch by (38)")
+    ax.plot(force, 1e3 * length, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
+    ax.plot(force, 1e3 * printed, color=VERMILLION, linewidth=1.1, label="without stretch by (38)")
     ax.set_yscale("log")
     second, bx = axes("$|T|$ [N]", "error of $d$ [mm]")
-    bx.plot(study.magnitude, printed, color=VERMILLION, linewidth=1.3, label="(36), (38)")
-    bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="without stretch by the mean tension")
+    bx.plot(force, off, color=VERMILLION, linewidth=1.3, label="(36), (38)")
+    bx.plot(force, left, color=GREEN, linewidth=1.3, label="without stretch by the mean tension")
     return finding(
         "stretch-removed",
         numbers=numbers,
@@ -272,8 +266,8 @@ def _tension(study: SagStudy, draw: Drawings) -> Finding:
     ax.set_xscale("log")
     ax.set_yscale("log")
     d, a_d = (values[MIDDLE, PICKED, DENSE] for values in (study.adjusting_length, study.a_d))
-    fits = a_d[:, None] * length_shape(tensions)
-    draw_courses(ax, (tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")))
+    fits = a_d[:, None] * tensions**-2
+    _draw_courses(ax, (tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")))
     share = study.adjusting_length / study.fitted_length
     numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
     return finding(
@@ -286,7 +280,7 @@ def _tension(study: SagStudy, draw: Drawings) -> Finding:
 def _chord(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, sampling.chords[-1], 80)
-    fits = study.q_a[:, DENSE, None] * chord_shape(fine)
+    fits = study.q_a[:, DENSE, None] * fine**3
     courses = sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g")
     captions = (
         f"a_d {_middle_and_dense(study)} with its cubic (figure 11).",
@@ -296,14 +290,14 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
     return finding(
         "a-over-chord",
         numbers={"cubic_away_share": away},
-        panels=course_panels(courses, ("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
+        panels=_course_panels(courses, ("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
     )
 
 
 def _angle(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, 0.5 * np.pi, 100)
-    fits = study.p_q[[*DRAWN], None] * angle_shape(fine)
+    fits = study.p_q[[*DRAWN], None] * np.cos(fine) ** 4
     labels = _named(sampling.densities[[*DRAWN]], ".1f")
     courses = sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels
     captions = (
@@ -314,7 +308,7 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
     return finding(
         "q-over-angle",
         numbers={"cos4_away_share": away},
-        panels=course_panels(courses, (r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
+        panels=_course_panels(courses, (r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
     )
 
 
@@ -322,8 +316,8 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     densities = study.sampling.densities
     fine = np.linspace(0.0, densities[-1], 80)
     figure, ax = axes(r"$\rho$ [kg/m]", "$p_q$ [N²/m²]")
-    with_fit(ax, densities, study.p_q, fine, study.k_p * density_shape(fine))
-    each = study.p_q / density_shape(densities)
+    _with_fit(ax, densities, study.p_q, fine, study.k_p * fine**2)
+    each = study.p_q / densities**2
     second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
     bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
     bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
@@ -344,15 +338,45 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     )
 
 
+def _with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
+    """Draw samples `y` at `x`, and the curve `fit` at `fine`, which was fitted to the samples."""
+    ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
+    ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
+
+
+# k curves: abscissae (n,) and values (k, n) of samples, abscissae (l,) and values (k, l) of fitted curves, k names
+_Courses: TypeAlias = tuple[Array, Array, Array, Array, list[str]]
+
+
+def _draw_courses(ax: Axes, courses: _Courses) -> None:
+    """Draw the samples and fitted curves of all `courses`; the colors change from dark to light."""
+    x, rows, fine, fits, names = courses
+    for row, fit, name, color in zip(rows, fits, names, shades(len(names)), strict=True):
+        ax.plot(x, row, "o", color=color, markersize=2.6, label=name)
+        ax.plot(fine, fit, color=color, linewidth=0.9)
+
+
+def _course_panels(
+    courses: _Courses, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
+) -> tuple[Panel, Panel]:
+    """Two panels: the curve with the index `one`, and all curves; labels: label of x, label of y, title of legend."""
+    x, rows, fine, fits, _ = courses
+    figure, ax = axes(*labels[:2])
+    _with_fit(ax, x, rows[one], fine, fits[one])
+    second, bx = axes(*labels[:2])
+    _draw_courses(bx, courses)
+    return draw.panel(figure, captions[0]), draw.panel(second, captions[1], labels[2])
+
+
 def _named(values: Iterable[float], form: str) -> list[str]:
     return [format(value, form) for value in values]
 
 
 def _middle_and_dense(study: SagStudy) -> str:
-    """Text of the angle and density of the drawn cables, for a caption."""
+    """Part of a caption: angle and density of the drawn cables."""
     return f"at φ = {n(ANGLE, unit='rad')}, ρ = {n(study.sampling.densities[DENSE], unit='kg/m')}"
 
 
 def _away(fit: Array, values: Array) -> float:
-    """Largest distance from a fit, divided by the largest value, along the axis of the fit (the second to last one)."""
+    """Largest difference between fit and values along the axis -2, divided by the largest value."""
     return float((np.abs(fit - values).max(axis=-2) / values.max(axis=-2)).max())

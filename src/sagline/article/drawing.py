@@ -1,4 +1,4 @@
-"""Findings and chapters of the report, with texts of data/report.toml, and small drawings that a phone can show."""
+"""Findings and chapters of the report with texts from data/report.toml, and drawings that are readable on a phone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from importlib.resources import files
 from itertools import count
 from math import ceil
 from string import Formatter
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib
 import numpy as np
@@ -21,7 +21,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.labels import legend_columns
-from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, Sheet, cable_look, format_axes, svg_text, unique_names
+from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, Sheet, cable_look, format_axes, svg_text, unique_names
 from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
 
 if TYPE_CHECKING:
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
 
 class _Numbers(Formatter):
-    """Formatter of numbers for readers: {extent:.3g mm}, {100*share:.1f %}, {errors[2]:.2f}; texts do not change."""
+    """Formatter of numbers in texts with fields such as {extent:.3g mm}, {100*share:.1f %} and {errors[2]:.2f}."""
 
     def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> tuple[Any, Any]:
-        """Value of a name; a factor before the name multiplies it."""
+        """Value of the field `field_name`, multiplied by the factor before its name, as in 100*share."""
         factor, _, name = field_name.rpartition("*")
         value, key = super().get_field(name, args, kwargs)
         return (float(factor) * value if factor else value), key
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Text of a number, with the format and the unit of its field."""
+        """Text of a number with the format and the unit that `format_spec` contains, as in .3g mm."""
         form, _, unit = format_spec.partition(" ")
         return n(value, form or ".4g", unit) if format_spec else str(value)
 
@@ -61,7 +61,7 @@ def finding(
     data: Sequence[Table] = (),
     **words: Any,
 ) -> Finding:
-    """Create the finding `key`. Its texts use `numbers` and `words`, and `numbers` are also saved."""
+    """Create the finding `key` with texts that contain values from `numbers` and `words`; `numbers` are also saved."""
     entry, known = _texts()["findings"][key], numbers or {}
     statement, measured = (_Numbers().format(entry.get(part, ""), **{**known, **words}) for part in _PARTS)
     return Finding(
@@ -79,7 +79,7 @@ def finding(
 
 
 def chapter(key: str, findings: Sequence[Finding], **words: Any) -> Chapter:
-    """Create the chapter `key`; its introduction uses `words`."""
+    """Create the chapter `key`; its introduction contains values from `words`."""
     entry = _texts()["chapters"][key]
     return Chapter(key, entry["title"], _Numbers().format(entry["lead"], **words), tuple(findings))
 
@@ -87,14 +87,14 @@ def chapter(key: str, findings: Sequence[Finding], **words: Any) -> Chapter:
 _PARTS = ("statement", "measured")
 
 
-WIDTH, HEIGHT = 4.6, 3.1  # size on a desktop screen [in]; on a phone, drawings have four fifths of this size
-LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # left, right: relative to the width; others [in]
+WIDTH, HEIGHT = 4.6, 3.1  # size of a drawing on a desktop screen [in]; a phone shows four fifths of this size
+LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins; left, right: relative to the width, below, above: [in]
 POINT = 1.0 / 72.0  # [in]
-APART = 40.0  # smallest distance between the numbers of two contour lines [pt]
+APART = 40.0  # smallest distance between the numbers that are written at two contour lines [pt]
 NAME_SIZE = TICK  # text size of legends [pt]
-SHARES = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8])  # possible places of a number along its line
+SHARES = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8])  # possible positions of a number along its contour line
 SHADES = "viridis"
-MOST_POINTS = 400  # largest number of points of a curve over time; it limits the size of the page
+MOST_POINTS = 400  # largest number of points of a curve over time, because the size of the page is limited
 
 _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|\n\s*(?=\n)", flags=re.DOTALL)
 _size = re.compile(r' (?:width|height)="[^"]*pt"')
@@ -104,14 +104,14 @@ MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins with space for a color bar
 
 
 class Drawings:
-    """Converter of figures to the drawings of a page; identifiers are unique in the page."""
+    """Converter of figures to drawings of a page, in which all identifiers are unique."""
 
     def __init__(self, page: str) -> None:
-        """Prepare drawings; their identifiers begin with `page`, the name of this part of the page."""
+        """Prepare drawings for a part of the page with the name `page`, with which all identifiers begin."""
         self._names = (f"{page}-{k}-" for k in count(1))
 
     def panel(self, figure: Sheet, caption: str, legend: str = "") -> Panel:
-        """Convert `figure` to a drawing of the page. A legend with the title `legend` is drawn if curves have names."""
+        """Convert `figure` to a drawing of the page, with a legend (title `legend`) if the curves have labels."""
         if figure.axes[0].get_legend_handles_labels()[1]:
             legend_above(figure.axes[0], legend)
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
@@ -122,7 +122,7 @@ class Drawings:
 
 def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
     """A small figure with one pair of axes."""
-    figure = Sheet(figsize=(WIDTH, height))  # fixed margins take half of the time that an automatic layout takes
+    figure = Sheet(figsize=(WIDTH, height))  # fixed margins take half of the time of an automatic layout
     figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BELOW / height, top=1.0 - ABOVE / height)
     ax = figure.add_subplot()
     format_axes(ax, x, y)
@@ -130,7 +130,7 @@ def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
 
 
 def legend_above(ax: Axes, title: str = "") -> None:
-    """Draw a legend above the axes in as many columns as fit, and increase the figure's height accordingly."""
+    """Draw a legend above the axes, with as many columns as fit, and make the figure higher by the legend's height."""
     figure = cast(Sheet, ax.get_figure(root=True))
     handles, labels = ax.get_legend_handles_labels()
     room = ax.get_position().width * figure.get_figwidth()
@@ -159,7 +159,7 @@ def legend_above(ax: Axes, title: str = "") -> None:
 
 
 def _grow(figure: Sheet, more: float) -> None:
-    """Increase the figure's height above the axes [in]; the size of the axes does not change."""
+    """Add `more` [in] to the height of the figure above the axes; the size of the axes does not change."""
     before, place = figure.get_figheight(), figure.subplotpars
     after = before + more
     figure.set_figheight(after)
@@ -167,16 +167,16 @@ def _grow(figure: Sheet, more: float) -> None:
 
 
 def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
-    """Make the vertical axis logarithmic; it ends at a floor."""
-    # A shaded strip with a text covers the parts of curves below the floor. If no part is below the floor, the axis is
-    # an ordinary logarithmic axis.
+    """Make the vertical axis logarithmic, with the lower end `floor`; the text `told` explains smaller values."""
+    # A shaded area with a text covers the curves below the floor. If no value is below the floor, there is no such
+    # area.
     ax.set_yscale("log")
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.get_lines()])
     seen = values[np.isfinite(values)]
     if not np.any(seen < floor):
         return
     high = 3.0 * max(float(seen.max()), 10.0 * floor)
-    strip = floor * (floor / high) ** 0.09  # strip as high as a line of text
+    strip = floor * (floor / high) ** 0.09  # the shaded area is as high as a line of text
     ax.set_ylim(strip, high)
     ax.axhspan(strip, floor, facecolor=GAP_COLOR, linewidth=0.0, zorder=3.0)
     ax.text(
@@ -198,7 +198,7 @@ def shades(number: int) -> list[tuple[float, float, float, float]]:
 
 
 def thinning(number: int) -> slice:
-    """Slice of at most `MOST_POINTS` of `number` samples, at equal steps of the index."""
+    """Slice that selects at most about `MOST_POINTS` of `number` samples, with equal steps of the index."""
     return slice(None, None, max(1, number // MOST_POINTS))
 
 
@@ -215,16 +215,10 @@ def cables_over_time(
     return figure
 
 
-def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
-    """Draw one curve with samples at `x`, and its fit."""
-    ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
-    ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
-
-
 def error_panels(
     names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str, draw: Drawings
 ) -> list[Panel]:
-    """Draw errors as circle areas at `position` (N, 3), seen along y and x; `series`: label, errors, scale, color."""
+    """Draw errors as areas of circles at `position` (N, 3), in two views; `series`: label, errors, scale, color."""
     panels = []
     for column, name in ((0, "x"), (1, "y")):
         figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
@@ -238,32 +232,8 @@ def error_panels(
     return panels
 
 
-# curves with their fits: abscissae (n,) and samples (k, n), abscissae (l,) and values (k, l) of the fits, names (k,)
-Courses: TypeAlias = tuple[Array, Array, Array, Array, list[str]]
-
-
-def draw_courses(ax: Axes, courses: Courses) -> None:
-    """Draw all curves with their fits, from dark to light."""
-    x, rows, fine, fits, names = courses
-    for row, fit, name, color in zip(rows, fits, names, shades(len(names)), strict=True):
-        ax.plot(x, row, "o", color=color, markersize=2.6, label=name)
-        ax.plot(fine, fit, color=color, linewidth=0.9)
-
-
-def course_panels(
-    courses: Courses, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
-) -> tuple[Panel, Panel]:
-    """Draw the curve `one` and all curves; `labels`: of both axes, and title of the legend."""
-    x, rows, fine, fits, _ = courses
-    figure, ax = axes(*labels[:2])
-    with_fit(ax, x, rows[one], fine, fits[one])
-    second, bx = axes(*labels[:2])
-    draw_courses(bx, courses)
-    return draw.panel(figure, captions[0]), draw.panel(second, captions[1], labels[2])
-
-
 def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
-    """Axes with space for a color bar."""
+    """A figure with one pair of axes, and with space for a color bar."""
     figure, ax = axes(x, y)
     figure.subplots_adjust(left=MAP_LEFT, right=MAP_RIGHT)
     ax.grid(visible=False)
@@ -273,9 +243,9 @@ def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
 def draw_errors(
     ax: Axes, x: Array, y: Array, error: Array, edges: Array, ticks: tuple[float, ...], lines: tuple[float, ...]
 ) -> None:
-    """Fill a map with one color between two round values of the error, and draw some contour lines."""
-    # Signed errors are interpolated through zero, so that bands around zero have their true width. Values below the
-    # first edge are gray, as in the color bar.
+    """Draw a map of errors with contour `lines`; each color represents the errors between two `edges`."""
+    # The sign of errors is kept for the interpolation, because absolute values would make bands around zero too wide.
+    # Errors smaller than the first edge are gray, as in the color bar.
     colors = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.92, len(edges)))
     filled = [*colors[::-1], matplotlib.colors.to_rgba(GAP_COLOR), *colors]
     ax.contourf(x, y, error, levels=[*-edges[::-1], *edges], colors=filled, extend="both").set_rasterized(True)
@@ -295,7 +265,7 @@ def draw_errors(
 
 
 def _number_lines(ax: Axes, drawn: ContourSet) -> None:
-    """Write the number of each contour line near its middle, apart from other numbers, with a halo."""
+    """Write the value of each contour line near its middle, with a halo, and far enough from other numbers."""
     figure: Any = ax.get_figure(root=True)
     apart, places = APART * POINT * figure.dpi, list[Array]()  # [pixels]
     inside = ax.bbox.padded(-0.5 * apart)
@@ -316,7 +286,7 @@ def _number_lines(ax: Axes, drawn: ContourSet) -> None:
 
 
 def _along_longest(ax: Axes, path: Path) -> Array:
-    """Points (n, 2) on the longest piece of a line, in the order of their distance from its middle [pixels]."""
+    """Points (n, 2) on the longest piece of a contour line [pixels]; points near the middle of the piece come first."""
     polygons = map(np.asarray, path.to_polygons(closed_only=False))
     pieces = [ax.transData.transform(piece) for piece in polygons if len(piece) > 1]
     passed = [np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T)))) for piece in pieces]

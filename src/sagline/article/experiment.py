@@ -1,8 +1,8 @@
-"""Repetition of the article's experiment with a controller and a machine: home, the ten poses of Table 2, home.
+"""Repetition of the article's experiment: a controller moves a machine from home to the ten poses and back home.
 
 In the article, the prototype moves from point to point "with low speed", and stops at each point for the measurement of
-its position. The experiment takes about 14 minutes. Speed and stops are not published; they are chosen so that the
-duration is the same. The machine is a twin, because the true position of a twin is known.
+its position. The experiment takes about 14 minutes. The published total duration determines the speed and the durations
+of the stops, which are not published. The machine is a twin, whose true position is known.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from sagline.core.arrays import Array, locked
 from sagline.core.results import Status
 
 PROTOTYPE: Final = "article-prototype"
-SPEED: Final = 0.06  # largest speed of the platform [m/s]; the fastest winch then has 61 mm/s
-STOP: Final = 14.0  # duration of a stop at each point, and at home at start and end [s]; the total is 13.9 minutes
-LOOK: Final = 1.0  # measured values are means over this last part of a stop [s]
+SPEED: Final = 0.06  # largest speed of the platform [m/s]; the fastest winch has 61 mm/s
+STOP: Final = 14.0  # duration of each stop, also at home [s]; the experiment takes 13.9 minutes
+LOOK: Final = 1.0  # measured values are means over this time at the end of a stop [s]
 BIAS: Final = 2.0  # load cell offset [N], 0.1 % of the range of a 2 kN load cell
 NEXT: Final = "Correct the cause, and start again."
-EVERY: Final = 10  # number of cycles between two points of a curve in a figure
+EVERY: Final = 10  # a curve in a figure has one point per this number of cycles
 
-Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
+Where = Callable[[], Array]  # function that returns the true position of the platform [m], shape (3,)
 Tell = Callable[[float], None]  # function that is called with the completed share of the experiment
 
 
 class StopObserver:
-    """Recorder (`sagline.control.Recorder`) of the stops and of the motions between them."""
+    """Recorder (`sagline.control.Recorder`) of the measured values at stops and during motions."""
 
     def __init__(self, where: Where, tell: Tell | None = None) -> None:
-        """Prepare a recorder without observations."""
-        self.stopped = ""  # "": the recorder has not failed
+        """Prepare a recorder; `where` returns the true position, and `tell` is called with the progress."""
+        self.stopped = ""  # "" means that the recorder has not failed
         self.farthest = self.misjudged = 0.0
         self.courses: list[Array] = []
         self.cycles = self.acted = self.stood = 0
@@ -51,17 +51,17 @@ class StopObserver:
         self._before: Array | None = None
 
     def begins(self, plan: sl.Plan) -> None:
-        """Store the plan of a motion; its first cycle belongs to the previous stop."""
+        """Store the plan of a motion. The first cycle of a motion counts as part of the previous stop."""
         self._plan, self._begun = plan, False
 
     def ends(self, status: Status, reason: str) -> None:
-        """Ignore the end of the plan, because the caller of the controller handles it."""
+        """Ignore the end of a plan, which the caller of the controller handles."""
 
     def event(self, event: control.Event) -> None:
         """Ignore events, because the controller stores them."""
 
     def cycle(self, cycle: control.Recorded) -> None:
-        """Observe a cycle."""
+        """Update all observations with the data of one cycle."""
         answer = cycle.answer
         if not isinstance(answer, control.Sample) or cycle.state not in (
             control.State.MOVING,
@@ -86,28 +86,29 @@ class StopObserver:
                 )
 
     def _stand(self, place: Array, cycle: control.Recorded, answer: control.Sample) -> None:
-        """Store the last second of a stop."""
+        """Store positions, tension and correction of one cycle at a stop; old cycles are dropped after a second."""
         self.stood += 1
         self.acted += self._before is not None and bool((cycle.correction != self._before).any())
         self._before = cycle.correction.copy()
         self._seen.append((place.copy(), cycle.position, answer.tension, self._before))
 
     def seen(self) -> tuple[Array, ...]:
-        """Means over the last second of a stop: true and estimated position, tension, correction."""
+        """Means over the last second of a stop: true position, estimated position, tension, correction."""
         return tuple(np.mean(rows, axis=0) for rows in zip(*self._seen, strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
-    """Result of the experiment, with K points of the time series and m winches."""
+    """Result of the experiment; the time series have K points, and the robot has m winches."""
 
     table: Table2
     robot: sl.Robot  # robot used by the controller
     true: Array  # true positions of the platform at the ten stops [m], shape (10, 3)
     estimated: Array  # positions estimated from the encoders at the stops [m], shape (10, 3)
-    tension: Array  # measured tensions at the stops, means over a second [N], shape (10, m)
+    tension: Array  # measured tensions at the stops, as means over a second [N], shape (10, m)
     planned_tension: Array  # planned tensions at the stops [N], shape (10, m)
-    # largest tension error in the null space, which lengths can correct with the platform at rest [N], shape (10,)
+    # largest tension error of a cable in the null space, which length changes can correct without motion [N], shape
+    # (10,)
     null_error: Array
     correction: Array  # correction of the lengths by the tension loop at the stops [m], shape (10, m)
     back: Array  # final minus initial position of the platform at home [m], shape (3,)
@@ -115,11 +116,11 @@ class Experiment:
     cells: Array  # measured tensions [N], shape (K, m)
     planned: Array  # planned tensions [N], shape (K, m)
     lengths: Array  # lengths minus lengths at home [m], shape (K, m)
-    stops: Array  # times of the ten stops, without the durations of the stops as in `time` [s], shape (10,)
+    stops: Array  # times of the ten stops on the time axis `time`, shape (10,)
     duration: float  # duration from home to home, including stops [s]
     winch_speed: float  # largest speed of a winch [m/s]
-    farthest: float  # largest distance of the true position from the set point in motion [m]
-    misjudged: float  # largest distance of the true position from the estimate [m]
+    farthest: float  # largest distance between true position and set point in motion [m]
+    misjudged: float  # largest distance between true and estimated position [m]
     acting: float  # share of the cycles at stops in which the tension loop changes the lengths
     events: tuple[control.Event, ...]  # events of the controller
 
@@ -135,7 +136,7 @@ class Experiment:
 
 
 def with_cells(robot: sl.Robot) -> sl.Robot:
-    """The robot, with load cell offsets of alternately +2 N and -2 N if it has none."""
+    """The robot with load cell offsets of +2 N and -2 N, if its load cells do not have offsets already."""
     winches = robot.winches
     if winches is None or winches.load_cell_bias.any():
         return robot
@@ -151,7 +152,7 @@ def in_process(
     loop: control.TensionSettings | None = None,
     tell: Tell | None = None,
 ) -> Experiment:
-    """Experiment on a twin in this process, in lockstep."""
+    """Run the experiment with a twin in this process, in lockstep."""
     planned = sl.load_robot(PROTOTYPE) if nominal is None else nominal
     real = with_cells(planned if true is None else true)
     twin = sl.twin.Machine(real, nominal=planned, start=level_poses(HOME), seed=seed)
@@ -160,7 +161,7 @@ def in_process(
 
 
 def experiment(controller: control.Controller, watch: StopObserver) -> Experiment:
-    """Run the experiment. Raise RefusedError if connecting or homing fails, or if the experiment ends early."""
+    """Run the experiment. Raise RefusedError if connection or homing fails, or if a fault ends the experiment."""
     legs = _legs(controller.period)
     controller.connect()
     controller.home(level_poses(HOME))
@@ -181,10 +182,10 @@ def experiment(controller: control.Controller, watch: StopObserver) -> Experimen
 
 
 def _executed(controller: control.Controller, leg: sl.Path, name: str) -> control.Execution:
-    """Carry out a motion; RefusedError if the motion does not reach its end."""
+    """Execute the motion `leg` to the point `name`; raise RefusedError if the platform does not reach the end."""
     try:
         done = controller.execute(leg)
-    except control.RefusedError as error:  # a fault may have occurred during planning, which takes some time
+    except control.RefusedError as error:  # planning takes some time, in which a fault can occur
         raise (
             error if controller.state is control.State.IDLE else _ended(controller, f"before the motion to {name}")
         ) from None
@@ -202,7 +203,7 @@ def _stand(controller: control.Controller, name: str) -> None:
 
 
 def _ended(controller: control.Controller, where: str) -> control.RefusedError:
-    """Error after a fault has ended the experiment."""
+    """Error with the fault that ended the experiment."""
     faults = [event.text for event in controller.events if event.kind is control.EventKind.FAULT]
     reason = faults[-1] if faults else controller.events[-1].text
     return control.RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
@@ -248,19 +249,19 @@ def _result(
 
 
 def _legs(period: float) -> list[sl.Path]:
-    """Straight paths from point to point, with quintic polynomials as in the article and one sample per cycle."""
+    """Straight paths between consecutive points, as quintic polynomials of time, with one sample per `period` [s]."""
     places = level_poses(points())
     return [sl.quintic_path([places[k], places[k + 1]], speed=SPEED, rate=1.0 / period) for k in range(len(places) - 1)]
 
 
 def duration() -> float:
-    """Duration of the experiment [s], including all stops and the stops at home before and after."""
+    """Duration of the experiment [s], including all stops at the ten poses and at home."""
     path = sl.quintic_path(points(), speed=SPEED, rate=10.0)
     return float(path.time[-1] - path.time[0]) + STOP * len(points())
 
 
 def points() -> Array:
-    """Positions of the path [m], shape (12, 3): home, the ten poses, and home."""
+    """Positions of all stops [m], shape (12, 3): home, the ten poses, and home."""
     return np.vstack((HOME, table2().desired, HOME))
 
 

@@ -1,4 +1,4 @@
-"""Page of an experiment: Table 2 and figures 25 to 27, compared with the article."""
+"""Page about an experiment: Table 2 and figures 25 to 27, compared with the article."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ NOTATION = (
     "An error is the true position minus the desired position. "
     "The true position of a twin is known; the true position of a prototype must be measured."
 )
-JERK = 2.0  # duration of the jerk phase in the article [s]
+JERK = 2.0  # duration of the phase with jerk in the article [s]
 AREA = 600.0  # area of the circle that shows the largest error [pt^2]
 
 
 def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
-    """Write a self-contained HTML page, and a JSON file with its numbers."""
+    """Write a self-contained HTML page about the experiment, and a JSON file with all numbers of the page."""
     chapter = experiment_chapter(result, how)
     lead = (
         "Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7: home, ten points, home, with a stop at "
@@ -40,7 +40,7 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
 
 
 def experiment_chapter(result: Experiment, how: str) -> Chapter:
-    """Chapter about an experiment."""
+    """Chapter about the result of an experiment; how: sentence about the machine and its controller."""
     draw = Drawings("experiment")
     return chapter(
         "experiment",

@@ -1,4 +1,4 @@
-"""Errors of the prototype's parameters: robots with errors, and fits of errors to measured positions."""
+"""Errors of the prototype's parameters: robots with such errors, and fits of the errors to measured positions."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ MODULUS, DENSITY, LOAD = "Young's modulus E", "linear density ρ", "load"
 ANCHORS, DRUM, ZERO = "anchor height", "drum radius", "zero of the lengths"
 PULLEY, DEAD = "pulley radius", "dead cable"
 WIDTH, HEIGHT = "platform anchors, outward", "platform anchors, up and down"
-Errors: TypeAlias = Mapping[str, float]  # error of each parameter in its unit, by name; missing errors are zero
+Errors: TypeAlias = Mapping[str, float]  # parameter name: error in the unit of the parameter; a missing error is zero
 
 
 class Parameter(NamedTuple):
-    """Parameter of the prototype that may differ from Table 1; the error is the same for all cables."""
+    """Parameter of the prototype that may differ from Table 1, with the same error for all cables."""
 
     name: str
     unit: str  # unit of the error
     typical: float  # typical error, in this unit
-    plausible: float  # largest plausible error, in this unit; assumed, because the article does not give it
+    plausible: float  # largest plausible error, in this unit; an assumption, because the article does not state errors
     positive: bool = False  # True if the error can only be positive
 
 
@@ -44,10 +44,10 @@ PARAMETERS = (
 
 
 def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
-    """Robot with errors of some parameters: anchors, cables, routing and load."""
+    """Robot with the errors `errors` of anchors, cables, routing and load."""
     off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
     cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
-    changes: dict[str, Any] = {}  # parts without errors are not copied, because a fit needs a thousand robots
+    changes: dict[str, Any] = {}  # only parts with errors are copied, because a fit needs a thousand robots
     if off[MODULUS] or off[DENSITY]:
         changes["cables"] = cables.replace(
             axial_stiffness=cables.axial_stiffness * (1.0 + 0.01 * off[MODULUS]),
@@ -67,15 +67,15 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
 
 
 def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
-    """Actual lengths that the winches give for the commanded lengths of `plan`, counted from `home`."""
+    """Actual lengths of the cables if the winches are commanded the lengths of `plan` after homing at `home`."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
-    """Equilibria (K, N, 3) [m] of robots with `errors`; their lengths are planned for the robot without errors."""
-    # In the home pose, the encoders are set to the planned lengths. Therefore, the lengths on pulleys and the dead
-    # lengths at home have no effect.
+    """Equilibrium positions (K, N, 3) [m] of K robots with `errors` that execute `plan`, a plan without errors."""
+    # At home, the encoders are set to the planned lengths. A constant length on or behind the pulleys therefore has no
+    # effect.
     robots = [robot_with_errors(robot, one) for one in errors]
     off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
     count, poses, m = off_drum.shape
@@ -93,7 +93,7 @@ def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequen
 
 
 def _not_counted(robots: Sequence[sl.Robot], home: sl.Plan) -> Array:
-    """Cable lengths on pulleys and behind them, at the home pose [m], shape (K, m)."""
+    """Cable lengths on the pulleys plus dead lengths, at the home pose [m], shape (K, m)."""
     added = np.zeros((len(robots), home.unstrained_length.shape[-1]))
     behind = [index for index, robot in enumerate(robots) if has_routing(robot)]
     if behind:
@@ -105,30 +105,29 @@ def _not_counted(robots: Sequence[sl.Robot], home: sl.Plan) -> Array:
     return added
 
 
-STEP = 0.01  # step of the difference quotients, relative to the typical error of the parameter
+STEP = 0.01  # step of the difference quotients, relative to the upper limit of the parameter's error
 ITERATIONS = 20
-CONVERGED = 1e-5  # a fit has converged if its last step moves the platform by less [m]; Table 2 has millimeters
-NEAR = 1e-3  # a value is at its limit if its distance from the limit, relative to the typical error, is smaller
+CONVERGED = 1e-5  # largest motion of the platform [m] in the last step of a converged fit; Table 2 is in millimeters
+NEAR = 1e-3  # largest distance from a limit, relative to the upper limit, of a value that counts as at the limit
 
 Model: TypeAlias = tuple[Parameter, ...]
-ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual minus desired positions of K machines [m], (K, N, 3)
+ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # gives actual minus desired positions [m], (K, N, 3)
 
 
 class Explanation(NamedTuple):
-    """Errors of some parameters, within plausible limits, that fit the measured positions best."""
+    """Best fit of the errors of k parameters, within plausible limits, to the measured positions."""
 
-    parameters: Model  # the parameters, k of them
+    parameters: Model  # the k parameters
     values: Array  # errors of the parameters in their units, shape (k,)
     deviation: Array  # standard deviations of the errors in their units, shape (k,); NaN at a limit
     at_limit: Flags  # True for errors that are at their plausible limit, shape (k,)
     predicted: Array  # actual minus desired position with these errors [m], shape (N, 3)
     rms: float  # root mean square of measured minus predicted position, over all coordinates [m]
     worst: float  # largest distance of measured and predicted position [m]
-    # Akaike's information criterion, corrected for few measurements; smaller values are better, and a difference of 2
-    # is small
+    # Akaike's information criterion, corrected for few measurements. Smaller values are better. A difference of 2 is
+    # not significant.
     aicc: float
-    # root mean square of measured minus predicted position over all coordinates [m]; the prediction of a pose is from a
-    # fit to all other poses
+    # as `rms`, but the prediction of each pose comes from a fit to all other poses [m]
     left_out: float
 
     @property
@@ -137,12 +136,12 @@ class Explanation(NamedTuple):
         return frozenset(parameter.name for parameter in self.parameters)
 
     def place(self, name: str) -> int:
-        """Index of the parameter with a name."""
+        """Index of the parameter with the name `name`."""
         return [parameter.name for parameter in self.parameters].index(name)
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
-    """Fit all models together to measured positions, by Gauss-Newton steps within plausible limits."""
+    """Fit every model to the measured positions by Gauss-Newton steps, with errors within plausible limits."""
     values, slopes = _start(error_of, measured, models)
     steps = [np.zeros(len(model)) for model in models]
     moving = list(range(len(models)))
@@ -152,7 +151,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         for i, (error, slope) in zip(moving, near, strict=True):
             right = measured.ravel() - error + slope @ values[i]
             step = _bounded_least_squares(models[i], slope, right) - values[i]
-            if step @ steps[i] < 0.0:  # opposite to the previous step: the steps oscillate about the solution
+            if step @ steps[i] < 0.0:  # the steps oscillate about the solution
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, slope
             if np.abs(slope @ step).max() > CONVERGED:
@@ -173,13 +172,13 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
 
 
 def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
-    """All models with one to `most` of the `parameters`."""
+    """All sets of one to `most` parameters, each of which is a model."""
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
 
 def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[tuple[Array, Array]]:
-    """Position errors (3 N,) [m] and derivatives (3 N, k) [m per unit] of each of the `models`, at its `values`."""
-    # the steps of finite differences are away from upper limits
+    """Position errors (3 N,) [m] and derivatives (3 N, k) [m per unit] for each pair of `models` and `values`."""
+    # near an upper limit, the step of the finite difference is negative
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
         high = limits(model)[1]
@@ -199,7 +198,7 @@ def limits(model: Model) -> tuple[Array, Array]:
 
 
 def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
-    """Least-squares solution within the limits; unknowns are divided by their upper limits."""
+    """Least-squares solution within the limits; the solver's unknowns are errors divided by their upper limits."""
     from scipy.optimize import lsq_linear
 
     low, high = limits(model)
@@ -221,7 +220,7 @@ def _errors(model: Model, values: Array) -> Errors:
 
 
 def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[list[Array], list[Array]]:
-    """Initial values and first-order model of every fit, from common derivatives at zero errors."""
+    """Initial values for the fit of every model, and derivatives of the positions at zero errors."""
     alone: list[Model] = [(parameter,) for parameter in dict.fromkeys(p for model in models for p in model)]
     near = dict(zip(alone, tangents(error_of, alone, [np.zeros(1)] * len(alone)), strict=True))
     slopes = [np.hstack([near[(parameter,)][1] for parameter in model]) for model in models]
@@ -251,7 +250,7 @@ def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, m
 
 
 def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
-    """Standard deviations of the values from the residuals; NaN for values at a limit."""
+    """Standard deviations of the values, computed from the residuals `rest`; NaN for values at a limit."""
     normal = slopes[:, free].T @ slopes[:, free]
     scatter = np.sum(rest**2) / (rest.size - free.sum())
     deviation = np.full(free.size, np.nan)
@@ -260,7 +259,7 @@ def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
 
 
 def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
-    """Cross-validation: rms error [m] of all poses, each of which a linear fit to all other poses predicts."""
+    """Cross-validation: rms error [m] if each pose is predicted by a linear fit to all other poses."""
     right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
     left = [
         right[pose == k] - slopes[pose == k] @ _bounded_least_squares(model, slopes[pose != k], right[pose != k])

@@ -1,4 +1,4 @@
-"""Study of figures 3 to 5: tensions and lengths with which a cable ends at a given position."""
+"""Study of figures 3 to 5: tensions and lengths for which the platform end of a cable is at a given position."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ CHORD = 10.0  # [m]
 TOLERANCES = (0.01, 0.001, 0.0001)  # [m]
 TENSIONS = np.linspace(10.0, 500.0, 200)  # [N]
 PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # [N]
-SHOWN = 2  # index of the length whose set psi has a drawing of its own
+SHOWN = 2  # index of the length for which the set psi is drawn separately
 LOW_PART = 50.0  # lowest tension of the curve [N], as in the article
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FeasibleSets:
-    """The sets psi of some lengths, the curve Psi over all lengths, and the line pi fitted to the projection of Psi."""
+    """Sets psi for some lengths, curve Psi for all lengths, and the line pi that is fitted to the projection of Psi."""
 
     cable: sl.Cable  # material
     end: End  # desired position B_d of the platform end
@@ -35,26 +35,26 @@ class _FeasibleSets:
     tensions: Array  # T_x along the curve Psi [N], shape (t,)
     vertical: Array  # T_z along the curve Psi [N], shape (t,)
     lengths: Array  # L along the curve Psi [m], shape (t,)
-    line: FittedLine  # the line pi of least squares through (T_x, T_z): slope a_pi, intercept b_pi [N]
+    line: FittedLine  # least-squares line pi through the points (T_x, T_z): slope a_pi, intercept b_pi [N]
 
     @property
     def tangent(self) -> float:
-        """The slope of pi by the article's (26), tan phi."""
+        """Slope tan phi of the line pi according to equation (26) of the article."""
         return self.end.rise / self.end.span
 
     @property
     def half_weight(self) -> float:
-        """The magnitude of the intercept by the article's (28), half the weight w D [N]."""
+        """Magnitude w D/2 of the intercept according to equation (28) of the article: half of the weight [N]."""
         return 0.5 * float(self.cable.linear_density) * GRAVITY * self.end.chord
 
 
 def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> _FeasibleSets:
-    """The article's sets psi at `psi_tensions` [N] and curve Psi at `tensions` [N], computed exactly."""
-    # At a given L, the map from T to B is one to one. The inverse map of the outline of the tolerance, |dx| + |dz| =
-    # epsilon_max around B_d, is therefore the outline of psi. A search is not necessary. Source: Gia Luan & Truong
-    # Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
+    """Exact computation of the article's sets psi at `psi_tensions` [N], and of its curve Psi at `tensions` [N]."""
+    # For a given L, each T gives one B, and each B needs one T. The outline of psi is therefore the set of all T for
+    # which B is on the outline of the tolerance, |dx| + |dz| = epsilon_max around B_d. A search is not necessary.
+    # Source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
     if points % 4:
         raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
     model, stretch = sl.Catenary(), end.chord / end.span
@@ -83,7 +83,7 @@ def _diamond(points: int) -> Array:
 
 
 def feasible_chapter() -> Chapter:
-    """Chapter about the tensions with which a cable ends at a point, exactly or within a tolerance."""
+    """Chapter about the tensions for which the end of a cable is at a point, exactly or within a tolerance."""
     end = End.at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     draw = Drawings("feasible")

@@ -1,4 +1,4 @@
-"""Chapter about the article's identification for another cable."""
+"""Chapter about the identification of the empirical model and of the material of a cable."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table, table_of
 
-SPANS = np.linspace(1.0, 13.0, 13)  # spans of the working range of the simulated robots [m]
+SPANS = np.linspace(1.0, 13.0, 13)  # spans that occur in the simulated robots [m]
 RISES = np.linspace(-5.0, 4.0, 10)  # [m]
 TENSIONS = np.linspace(20.0, 400.0, 77)  # [N]
 TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # [m]
@@ -22,7 +22,7 @@ LINES = (1e-3, 5e-3, 1e-2)  # contour lines of the map [m]
 SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # standard deviations of lengths [m] and tensions [N]
 BOTH = ("linear_density", "axial_stiffness")
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-CASES = (  # for each set of measurements: lowest and highest chord tension [N], and the unknowns
+CASES = (  # for each set of synthetic measurements: lowest and highest chord tension [N], and the unknowns
     ("loose and taut", 30.0, 600.0, BOTH),
     ("taut only", 300.0, 600.0, BOTH),
     ("loose only", 15.0, 40.0, BOTH),
@@ -31,7 +31,7 @@ CASES = (  # for each set of measurements: lowest and highest chord tension [N],
 
 
 def identify_chapter() -> Chapter:
-    """Chapter: identify_empirical for the simulation's cable, and identify_cable for synthetic measurements."""
+    """Chapter with results of `identify_empirical` for the simulated cable, and of `identify_cable`."""
     fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
     draw = Drawings("identify")
     return chapter("identify", (_constants(fit, draw), _limits(fit, draw), _measured()))
@@ -142,7 +142,7 @@ def _measured() -> Finding:
 
 
 def _made_up_fit(cable: sl.Cable, lowest: float, highest: float, unknowns: tuple[str, ...]) -> CableFit:
-    """Identify `cable` from measurements with random scatter, at chord tensions from `lowest` to `highest` [N]."""
+    """Identify `cable` from synthetic measurements with noise, at chord tensions from `lowest` to `highest` [N]."""
     random = np.random.default_rng(SEED)
     span, rise = random.uniform(2.0, 12.0, SAMPLES), random.uniform(-4.0, 2.0, SAMPLES)
     tension: Array = random.uniform(lowest, highest, SAMPLES)

@@ -1,4 +1,4 @@
-"""The article's identification of the empirical model, for any cable and working range."""
+"""Identification of the empirical model's constants for any cable and working range, as in the article."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ POINT_BYTES = 400.0  # memory per combination of span, rise and tension during t
 class Estimate(NamedTuple):
     """A fitted constant and its confidence interval.
 
-    The interval is computed as for least squares. However, the residuals are not noise, but errors of the model in the
-    working range. Therefore, the interval shows how the constant varies within the range.
+    The residuals of the least-squares fit are errors of the model in the working range, not noise. The confidence
+    interval therefore shows how much the constant varies within the working range.
     """
 
     value: float  # value of the constant
@@ -40,8 +40,8 @@ class Estimate(NamedTuple):
 class EmpiricalFit(Result):
     """An empirical model for one cable and one working range, and the errors of the model.
 
-    The arrays have axes for s spans, r rises and t tensions, in ascending order. The position error is |dx| + |dz|, as
-    in (20) of the article: the distance between B_d and the end of an exact cable that has the model's force and
+    The arrays have axes for s spans, r rises and t tensions, in ascending order. The position error |dx| + |dz| of
+    equation (20) of the article is the distance between B_d and the end of an exact cable with the model's force and
     length.
 
     Attributes:
@@ -73,26 +73,26 @@ class EmpiricalFit(Result):
     cable_weight: Array
 
     def tension_min(self, tolerance: float) -> float:
-        """T_x,min of the article [N]: the lowest T_x from which on all sampled cables keep a tolerance.
+        """Lowest tension T_x,min of the article [N]: all sampled cables with at least this T_x keep a tolerance.
 
         Args:
             tolerance: Allowed position error [m], > 0.
 
         Returns:
-            The tension; NaN if cables exceed the tolerance even at the highest sampled tension.
+            The tension; NaN if a cable with the highest sampled tension exceeds the tolerance.
         """
         worst = self.position_error.max(axis=(0, 1))
         return _first_of_good_tail(self.tensions, worst <= _tolerance(tolerance))
 
     def weight_max(self, tolerance: float, tension: float | None = None) -> float:
-        """w_max of the article [N]: the largest weight w L up to which all sampled cables keep a tolerance.
+        """Largest weight w_max of the article [N]: all sampled cables up to this weight w L keep a tolerance.
 
         Args:
             tolerance: Allowed position error [m], > 0.
-            tension: Only cables with at least this T_x count [N]; None for all cables.
+            tension: Smallest T_x of the considered cables [N]; None to consider all cables.
 
         Returns:
-            The weight; NaN if even the lightest cable exceeds the tolerance.
+            The weight; NaN if the lightest cable exceeds the tolerance.
         """
         counted = self.tensions >= (0.0 if tension is None else number(tension, "tension", "N"))
         weight = self.cable_weight[..., counted].ravel()
@@ -106,13 +106,13 @@ def identify_empirical(
 ) -> EmpiricalFit:
     """Find the constants of the empirical model for a cable and its working range.
 
-    T_z is linear in k_h, and L is linear in k_p, so that one least-squares step for each constant is sufficient. The
-    first step determines k_h from T_z, with the slope tan phi. The second step determines k_p from L by (48), with
-    the k_h of the first step.
+    T_z is linear in k_h, and L is linear in k_p. One linear least-squares fit per constant is therefore sufficient. The
+    first fit determines k_h from T_z, with the slope tan phi. The second fit determines k_p from L by equation (48),
+    with the k_h of the first fit.
 
     Args:
         cable: Material of a single cable with positive density.
-        spans: Horizontal distances of the ends [m], shape (s,), > 0.
+        spans: Horizontal distances between the ends of the cable [m], shape (s,), > 0.
         rises: Heights of the platform end above the frame end [m], shape (r,); negative if the platform end is lower.
         tensions: T_x [N], shape (t,), > 0.
         gravity: Gravitational acceleration [m/s^2], > 0.
@@ -121,7 +121,7 @@ def identify_empirical(
         The fit; its `model` can be used in `inverse`.
 
     Raises:
-        InvalidValueError: If `cable` is not a cable or has no weight, or if a value is out of range.
+        InvalidValueError: If `cable` is not a single cable with weight, or if a value is out of range.
         CableGeometryError: If a span and a rise are both zero.
 
     Examples:
@@ -171,14 +171,14 @@ def identify_empirical(
         tensions=axes[2],
         force_residual=found.vertical_force - exact.vertical_force,
         length_residual=found.unstrained_length - exact.unstrained_length,
-        position_error=end_position_error(found),
+        position_error=_end_position_error(found),
         cable_weight=exact.cable_weight,
     )
 
 
-def end_position_error(state: CableState) -> Array:
-    """Position error (20) of the article, |dx| + |dz| [m]: distance between B_d and the ends of exact cables."""
-    # state: states of any model, shape (...); returns errors of the same shape
+def _end_position_error(state: CableState) -> Array:
+    """Position error |dx| + |dz| [m] of equation (20): distance between B_d and the ends of exact cables."""
+    # `state` may come from any cable model; the errors have the shape of `state`
     shape = state.shape
     horizontal, vertical, length, weight, stiffness = (
         kernel_input(operand, shape).reshape(-1)
@@ -197,7 +197,7 @@ def end_position_error(state: CableState) -> Array:
 
 
 def _estimate(shape: Array, value: Array) -> Estimate:
-    """Least-squares factor of value = factor * shape, with its confidence interval."""
+    """Factor of the least-squares fit value = factor * shape, with its confidence interval."""
     from scipy.stats import t
 
     x, y = shape.ravel(), value.ravel()
@@ -213,7 +213,7 @@ def _tolerance(tolerance: float) -> float:
 
 
 def _first_of_good_tail(values: Array, good: Flags) -> float:
-    """First value from which on all values are good; NaN if the last value is not good."""
+    """First value after the last value that is not good; NaN if no good value follows."""
     bad = np.flatnonzero(~good)
     first = int(bad[-1]) + 1 if bad.size else 0
     return float(values[first]) if first < values.size else float("nan")

@@ -20,10 +20,10 @@ from sagline.core.results import Result
 
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-TOO_LOOSE = 0.5  # a value counts as not determined if its relative standard error is larger
-TOO_CLOSE = 0.95  # two values count as not separable if their correlation is larger
-ITERATIONS = 30  # iterations to compute the chord tension from the tension at an end
-WEIGHTINGS = 3  # iterations of the weights, because they depend slightly on the solution
+TOO_LOOSE = 0.5  # largest relative standard error of a value that counts as determined
+TOO_CLOSE = 0.95  # largest correlation of two values that count as separable
+ITERATIONS = 30  # largest number of iterations of the chord tension for a measured tension at an end
+WEIGHTINGS = 3  # number of computations of the weights, which depend slightly on the solution
 _ADVICE = {
     "linear_density": "measure at lower tensions or longer spans, to increase the sag",
     "axial_stiffness": "measure at higher tensions, to increase the stretch",
@@ -36,10 +36,10 @@ class CableFit(Result):
 
     Attributes:
         cable: The identified cable.
-        names: Unknowns, in the order of the following arrays: "linear_density" [kg/m], "axial_stiffness" [N],
-            "length_offset" [m]. The offset is positive if the measured lengths are too long.
+        names: Names of the unknowns in the order of `values`: "linear_density" [kg/m], "axial_stiffness" [N],
+            "length_offset" [m]. A positive offset means that the measured lengths are too long.
         values: Estimates, shape (k,).
-        covariance: Covariance of the values, shape (k, k), which follows from the given standard errors.
+        covariance: Covariance of the values, shape (k, k), computed from the given standard errors.
         residuals: Measured minus predicted length [m], shape (n,).
         chi_squared: Sum of squares of the residuals in standard errors, divided by the degrees of freedom. The value is
             about 1 if the cable model and the standard errors are correct, and much larger if one of them is wrong.
@@ -66,7 +66,7 @@ class CableFit(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Texts about values that the data do not determine or do not separate; empty if all values are determined."""
+        """Texts about values that the measurements do not determine or do not separate; may be empty."""
         found = []
         for name, value, error in zip(self.names, self.values, self.standard_error, strict=True):
             if name != "length_offset" and error > TOO_LOOSE * value:
@@ -99,19 +99,19 @@ def identify_cable(
 ) -> CableFit:
     """Find a cable's density and stiffness from measured lengths and tensions by weighted least squares.
 
-    The exact cable predicts each length from the measured tension. Each residual is divided by its standard error,
-    which combines the errors of length and tension.
+    An exact cable with the measured tension gives the predicted length. The residual, measured minus predicted length,
+    is divided by its standard error, which includes the errors of length and tension.
 
     Args:
-        span: Horizontal distance of the ends [m], shape (n,), > 0.
+        span: Horizontal distance between the ends of the cable [m], shape (n,), > 0.
         rise: Height of the platform end above the frame end [m], shape (n,).
-        unstrained_length: Measured L from an encoder [m], shape (n,), > 0.
+        unstrained_length: Measured unstrained length, for example from an encoder [m], shape (n,), > 0.
         tension: Measured tension [N], shape (n,), > 0.
         length_error: Standard error of a length [m], > 0.
         tension_error: Standard error of a tension [N], > 0.
-        tension_at: Measured tension: "frame_end" (load cell at the winch), "platform_end" or "chord".
-        unknowns: One or several of "linear_density", "axial_stiffness", "length_offset".
-        start: Initial values of the unknowns, and values of the known parameters; None for 0.1 kg/m and 100 kN.
+        tension_at: Kind of the measured tension: "frame_end" (load cell at the winch), "platform_end" or "chord".
+        unknowns: Names of the unknowns: "linear_density", "axial_stiffness", "length_offset", or some of these.
+        start: Cable with initial values of unknowns and values of known parameters; None for 0.1 kg/m and 100 kN.
         gravity: Gravitational acceleration [m/s^2], > 0.
 
     Returns:
@@ -159,12 +159,12 @@ def identify_cable(
 def _predicted_length(
     cable: Cable, tension: Array, *, span: Array, rise: Array, tension_at: TensionAt, gravity: float
 ) -> Array:
-    """Lengths [m] of exact cables with the tension `tension` [N] at the place of measurement."""
+    """Lengths [m] of exact cables that have the tension `tension` [N] at the place `tension_at`."""
     chord = np.hypot(span, rise)
     half = 0.5 * cable.linear_density * gravity * chord
     side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[tension_at]
     across = half * span / chord if side else 0.0
-    floor = 1e-3 * tension  # a lower limit, because half the weight of the cable can exceed the measured tension
+    floor = 1e-3 * tension  # lower limit: half of the cable's weight can exceed the measured tension
     tau = np.maximum(side * half * rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
     state = Catenary().from_tension(cable, span, rise, tau, gravity)
     for _ in range(ITERATIONS if side else 0):
@@ -188,7 +188,7 @@ def _fit(
 ) -> CableFit:
     from scipy.optimize import least_squares
 
-    # logarithms keep density and stiffness positive; the offset is in millimeters
+    # The solver's unknowns are logarithms of density and stiffness, which keep both positive, and the offset in mm.
     scale = np.array([1e-3 if name == "length_offset" else 1.0 for name in names])
     unknown = np.array([0.0 if name == "length_offset" else np.log(float(getattr(known, name))) for name in names])
     spread = np.full(length.size, length_error)
@@ -209,11 +209,11 @@ def _fit(
         higher, lower = (predicted(cable, f * tension) for f in (1.0 + 1e-4, 1.0 - 1e-4))
         slope = (higher - lower) / (2e-4 * tension)
         spread = np.hypot(length_error, slope * tension_error)
-    # covariance with the weights of the last iteration
+    # the covariance uses the weights of the last iteration
     jacobian = found.jac
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
     values = np.array([offset if name == "length_offset" else float(getattr(cable, name)) for name in names])
-    unit = np.where(scale < 1.0, scale, values)  # derivative d value/d unknown
+    unit = np.where(scale < 1.0, scale, values)  # derivative of the value by the solver's unknown
     freedom = max(length.size - len(names), 1)
     rest = residuals(unknown)
     return CableFit(
@@ -227,7 +227,7 @@ def _fit(
 
 
 def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-    """Bounds of the unknowns, which every rope satisfies: 1 mg/m to 1 t/m, and 1 N to 1 PN."""
+    """Bounds of the unknowns, wide enough for every rope: 1 mg/m to 1 t/m, and 1 N to 1 PN."""
     low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
     high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
     return [low[name] for name in names], [high[name] for name in names]

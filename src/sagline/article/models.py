@@ -1,4 +1,4 @@
-"""Errors of the five cable models, and the ranges in which they are sufficient."""
+"""Chapter about the errors of the five cable models, and about the ranges in which each model is sufficient."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MODELS: tuple[sl.CableModel, ...] = (
     sl.Empirical(),
     sl.Parabolic(),
     sl.Catenary(),
-)  # from the least to the most accurate model
+)  # the least accurate model comes first
 NAMES = tuple(type(model).__name__ for model in MODELS)
 CHORDS = np.geomspace(1.0, 30.0, 41)  # [m]
 TENSIONS = np.geomspace(5.0, 2000.0, 61)  # [N]
@@ -43,16 +43,16 @@ TOLERANCE = 1e-3  # [m]
 FLOOR = 1e-9  # smallest drawn error [m]
 EDGES, LINES = 10.0 ** np.arange(-9.0, 1.0), (1e-4, 1e-3, 1e-2)  # filled contours and contour lines of the maps [m]
 TICKS = (1e-9, 1e-6, 1e-3, 1.0)  # [m]
-FINE_CHORDS, FINE_TENSIONS = np.geomspace(1.0, 30.0, 140), np.geomspace(5.0, 2000.0, 180)  # abscissae of the maps
+FINE_CHORDS, FINE_TENSIONS = np.geomspace(1.0, 30.0, 140), np.geomspace(5.0, 2000.0, 180)  # grid of the maps
 FINE_DENSITIES = np.geomspace(0.01, 1.0, 140)  # [kg/m]
-FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # the platform end is below the frame end
+FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # [rad], negative: the platform end is below the frame end
 REFERENCE = {"chord": 10.0, "angle": float(np.radians(-30.0)), "density": 0.067, "tension": 100.0}
-USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0))  # chord [m], tension [N] of the table
+USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0))  # table: chord [m], tension [N]
 
 
 def model_errors(axial_stiffness: float, *axes: ArrayLike) -> tuple[Array, Array]:
-    """Errors of L [m] and T_z [N], (5, c, a, r, t), for chords [m], angles [rad], densities [kg/m], tensions [N]."""
-    # All models have the same chord tension, so that the error of L is the error of the length at a winch.
+    """Errors of L [m] and T_z [N], (5, c, a, r, t), for chords [m], angles [rad], densities [kg/m] and tensions [N]."""
+    # All models have the same chord tension. The error of L is therefore the length error at the winch.
     chord, angle, density, tension = np.meshgrid(*axes, indexing="ij")
     cable, span, rise = sl.Cable(density, axial_stiffness), chord * np.abs(np.cos(angle)), chord * np.sin(angle)
     states = [model.from_tension(cable, span, rise, tension, GRAVITY) for model in MODELS]
@@ -62,13 +62,13 @@ def model_errors(axial_stiffness: float, *axes: ArrayLike) -> tuple[Array, Array
 
 
 def sufficient_models(length_error: Array, tolerance: float) -> Array:
-    """Index of the least accurate of the sufficient models, for each cable."""
+    """Index of the least accurate model with a length error of at most `tolerance` [m], for each cable."""
     coarsest: Array = np.argmax(np.abs(length_error) <= tolerance, axis=0)
     return coarsest
 
 
 def models_chapter() -> Chapter:
-    """Chapter about the choice of a cable model for a controller."""
+    """Chapter about the choice of the cable model in a controller."""
     cable = simulated_cable()
     draw = Drawings("models")
     return chapter(
@@ -80,7 +80,7 @@ def models_chapter() -> Chapter:
 
 
 def _study(**varied: Array) -> tuple[Array, Array]:
-    """Errors as functions of the quantities `varied`; all other quantities have their reference values."""
+    """Errors of all models for the quantities in `varied`; all other quantities have reference values."""
     at = (varied.get(name, np.array([REFERENCE[name]])) for name in ("chord", "angle", "density", "tension"))
     return model_errors(float(simulated_cable().axial_stiffness), *at)
 
@@ -124,11 +124,11 @@ def _sufficient(draw: Drawings) -> Finding:
 
 
 def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawings) -> Panel:
-    """Map of the least accurate sufficient model; at its borders, a length error has the allowed size."""
+    """Map that shows the least accurate sufficient model; `heights`: values on the vertical axis."""
     colors = matplotlib.colormaps["viridis_r"](0.9 * np.arange(len(NAMES)) / (len(NAMES) - 1))
     figure, ax = map_axes("chord tension [N]", label)
     ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, color=colors[-1], zorder=0.5))
-    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # less accurate models on top
+    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # less accurate models are on top
         band = ax.contourf(FINE_TENSIONS, heights, error, levels=[-TOLERANCE, TOLERANCE], colors=[color])
         band.set_rasterized(True)
     if heights is FINE_CHORDS:

@@ -27,7 +27,7 @@ from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, Table, table_of
 
-AREA = 2e4  # area of a circle per meter of error [pt^2/m]
+AREA = 2e4  # area of a circle that shows an error, per meter of the error [pt^2/m]
 
 
 def poses_chapter() -> Chapter:
@@ -38,12 +38,12 @@ def poses_chapter() -> Chapter:
         "poses",
         (
             _table(study),
-            single_causes(study),
+            _single_causes(study),
             _tour(draw),
             _space(study, draw),
             _trends(study, draw),
-            best_explanations(study, draw),
-            limits_of_ten_points(study),
+            _best_explanations(study, draw),
+            _limits_of_ten_points(study),
         ),
     )
 
@@ -171,7 +171,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
 
 
 def _typical(parameter: Parameter) -> str:
-    """Text of a parameter with its typical error."""
+    """Text with the name of a parameter and its typical error."""
     return f"{parameter.name} {n(parameter.typical, '+g', parameter.unit)}"
 
 
@@ -180,23 +180,23 @@ def _span(values: Array, form: str) -> str:
 
 
 COUNTS = ("one parameter", "two parameters", "three parameters")
-SHOWN = 8  # number of rows with two parameters, and with three, in the table of explanations
-FEW = 6e-3  # an explanation is good if its remaining error is at most this [m]
+SHOWN = 8  # number of table rows for explanations by two parameters, and for explanations by three
+FEW = 6e-3  # largest remaining error of a good explanation [m]
 PRINTING = 1e-3 / np.sqrt(12.0)  # standard deviation of the rounding of positions to whole millimeters [m]
 NOTHING = 0.95  # a model explains nothing if its remaining error exceeds this share of the measured error
-ALIKE = 0.2  # a slope over height counts as zero below this share of the measured slope
-AS_MEASURED = 0.15  # a slope counts as equal to the measured slope below this relative difference
+ALIKE = 0.2  # a slope over height counts as zero if it is less than this share of the measured slope
+AS_MEASURED = 0.15  # largest relative difference of a slope that counts as equal to the measured slope
 LOWEST, HIGHEST = "P8", "P7"
 
 
-def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
-    """Finding: the best explanations, and the benefit of more parameters."""
+def _best_explanations(study: TenPoses, draw: Drawings) -> Finding:
+    """Finding about the best explanations of the measured errors by one, two and three parameters."""
     one, two, three = (study.best(count) for count in (1, 2, 3))
     second = study.explanations[1][1]
     alone = {found.parameters[0].name: found for found in study.explanations[0]}
     beside = {name: study.explanation(ZERO, PULLEY, name) for name in (DEAD, MODULUS, LOAD)}
     places = [(beside[name], beside[name].place(name)) for name in (MODULUS, LOAD)]
-    ratios = [abs(found.values[k]) / found.deviation[k] for found, k in places]  # distances from nominal values
+    ratios = [abs(found.values[k]) / found.deviation[k] for found, k in places]  # from zero error, in deviations
     far = float(np.ceil(10.0 * max(ratios))) / 10.0
     inside = min(found.aicc for found in study.explanations[2] if not found.at_limit.any())
     count = sum(len(group) for group in study.explanations)
@@ -228,8 +228,8 @@ def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
     )
 
 
-def limits_of_ten_points(study: TenPoses) -> Finding:
-    """Finding: limits of ten points, and the parameters that ten points cannot separate."""
+def _limits_of_ten_points(study: TenPoses) -> Finding:
+    """Finding about parameters that the measured errors of ten poses cannot separate or determine."""
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {PULLEY, ANCHORS} for found in few)
     zeros = 1e3 * study.single_zero
@@ -309,7 +309,7 @@ def _values(found: Explanation) -> str:
 
 
 def _told(found: Explanation, name: str) -> str:
-    """Text of the value of `name`: with its standard uncertainty, or with a mark if the value is at a limit."""
+    """Text of the value of `name` with its standard uncertainty; a value at a limit has the mark "(limit)"."""
     k = found.place(name)
     value, unit = found.values[k], found.parameters[k].unit
     if found.at_limit[k]:
@@ -317,8 +317,8 @@ def _told(found: Explanation, name: str) -> str:
     return n(value, unit=unit, uncertainty=found.deviation[k])
 
 
-def single_causes(study: TenPoses) -> Finding:
-    """Finding: each class of parameters alone, with an example, the best value, the remaining error and its reason."""
+def _single_causes(study: TenPoses) -> Finding:
+    """Finding about each parameter alone: typical effect, best value, remaining error, and reason for this error."""
     ranked = study.explanations[0]
     alone = {found.parameters[0].name: found for found in ranked}
     slopes = {name: study.height_slope(found.predicted) for name, found in alone.items()}

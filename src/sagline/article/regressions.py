@@ -1,4 +1,4 @@
-"""Figures 6 to 15: sampled cables, and the article's regressions for its two constants k_h and k_p."""
+"""Study of figures 6 to 15: sampled cables, and the regressions of the article for its constants k_h and k_p."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 import sagline as sl
 from sagline.core.arrays import Array
 
-GRAVITY = 9.81  # [m/s^2], the same in all studies of the article
+GRAVITY = 9.81  # [m/s^2], in all studies of the article
 ANGLE = 0.754  # angle of the article's figure 10 [rad]
 UNSTRETCHABLE = 1e20  # stiffness [N] for which the strain is below the rounding error
 
 
 class FittedLine(NamedTuple):
-    """Lines y = slope x + intercept, fitted to samples along the last axis."""
+    """Least-squares lines y = slope x + intercept through samples along the last axis of arrays."""
 
     slope: Array  # slope, shape (...)
     intercept: Array  # intercept, shape (...)
-    r_squared: Array  # coefficient of determination: share of the variance of y that the line explains, shape (...)
+    r_squared: Array  # coefficient of determination, 1 if all samples are on the line, shape (...)
     deviation: Array  # largest distance of a sample from the line, in the unit of y, shape (...)
 
 
 def fit_line(x: Array, y: Array) -> FittedLine:
-    """Fit least-squares lines to the samples `x` and `y` along the last axis."""
+    """Fit least-squares lines to the samples (`x`, `y`) along the last axis of both arrays."""
     x, y = np.broadcast_arrays(x, y)
     away_x = x - x.mean(axis=-1, keepdims=True)
     away_y = y - y.mean(axis=-1, keepdims=True)
@@ -39,7 +39,8 @@ def fit_line(x: Array, y: Array) -> FittedLine:
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
     """Least-squares factor a of `y` = a * `shape`, along the axis `axis`."""
-    # all other regressions of the article have this form; the shape is 1/T_x^2, D^3, cos^4(phi), rho^2, D or rho
+    # Except for lines, all regressions of the article have this form. The shape is 1/T_x^2, D^3, cos^4(phi), rho^2, D
+    # or rho.
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
     return factor
@@ -53,7 +54,7 @@ class End(NamedTuple):
 
     @classmethod
     def at_angle(cls, chord: float) -> End:
-        """End of a chord of the length `chord` [m], at the article's angle."""
+        """Platform end of a cable with a chord of the length `chord` [m], at the angle of the article."""
         return cls(chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE)))
 
     @property
@@ -63,7 +64,7 @@ class End(NamedTuple):
 
 
 class Sampling(NamedTuple):
-    """Every combination of four quantities of cables without stretch; the platform end is above the frame end."""
+    """Cables without stretch for all combinations of four quantities; the platform end is above the frame end."""
 
     angles: Array  # angle phi of the chord (the article's beta), between 0 and pi/2 [rad]
     chords: Array  # D [m]
@@ -71,19 +72,19 @@ class Sampling(NamedTuple):
     tensions: Array  # T_x [N]
 
     def hang(self) -> sl.CableState:
-        """States of the sampled cables, by the exact model."""
+        """States of the sampled cables according to the exact model."""
         angle, chord, density, tension = np.meshgrid(*self, indexing="ij")
         cosine = np.cos(angle)
         cable, chord_tension = sl.Cable(density, UNSTRETCHABLE), tension / cosine
         return sl.Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), chord_tension, GRAVITY)
 
     def between(self, lowest: float, highest: float) -> Sampling:
-        """The same sampling, with tensions evenly spaced from `lowest` to `highest` [N]."""
+        """Sampling with other tensions, which are evenly spaced from `lowest` to `highest` [N]."""
         return self._replace(tensions=np.linspace(lowest, highest, self.tensions.size))
 
 
 def article_sampling() -> Sampling:
-    """Assumed samples; the article gives only phi = 0.754 rad and rho in (0, 2)."""
+    """Assumed samples of the article, which states only phi = 0.754 rad and rho in (0, 2)."""
     # Chords from 2 to 16 m, as in the frames of the article's Table 1; five angles around 0.754 rad; ten densities;
     # sixty tensions from 100 N to 10 kN, evenly spaced. Source: Gia Luan & Truong Thinh 2020, figures 6 to 15
     return Sampling(
@@ -104,26 +105,26 @@ PUBLISHED_K_H = 4.845  # [m/s^2], magnitude; Gia Luan & Truong Thinh 2020, secti
 PUBLISHED_K_P = 4.385  # [m^2/s^4], section 5.2.4
 SHALLOW_K_H = GRAVITY / 2.0
 SHALLOW_K_P = GRAVITY**2 / 24.0
-LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals for both ends of the range of tensions [N]
+LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals of lowest and highest tension [N]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterceptStudy:
-    """Intercepts b_pi of the forces on one end of the cable, and the article's regressions."""
+    """Intercepts b_pi for one end of the cable, and the regressions of the article that lead from b_pi to k_h."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities
     slope: Array  # slopes a_pi of the fitted lines, shape (a, c, r)
     intercept: Array  # intercepts b_pi of the fitted lines [N], shape (a, c, r)
-    h_b: Array  # h_b in b_pi = h_b D [N/m], shape (a, r)
-    k_h_of_angle: Array  # k_h in h_b = k_h rho, for each angle [m/s^2], shape (a,)
-    k_h: float  # k_h in h_b = k_h rho, for all angles together [m/s^2]
+    h_b: Array  # factor in b_pi = h_b D [N/m], shape (a, r)
+    k_h_of_angle: Array  # factor in h_b = k_h rho, fitted for each angle [m/s^2], shape (a,)
+    k_h: float  # factor in h_b = k_h rho, fitted for all angles together [m/s^2]
 
 
 def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
-    """The regressions (21), (27), (28) of the article, at the platform end and at the frame end."""
-    # Both lines are vertical forces on the cable. The force at the frame end is smaller by the cable's weight, so that
-    # its intercept is negative. Source: Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in
-    # docs/errata.md
+    """Regressions (21), (27), (28) of the article, first for the platform end, then for the frame end."""
+    # The lines show vertical forces on both ends of the cable. The force at the frame end is smaller by the weight of
+    # the cable. Its intercept is therefore negative. Source: Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and
+    # 7; erratum 1 in docs/errata.md
     state = sampling.hang()
     frame_end = state.vertical_force - state.cable_weight
     return _study(sampling, state.vertical_force), _study(sampling, frame_end)
@@ -144,20 +145,8 @@ def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StretchStudy:
-    """Adjusting length d = L - D of a cable, as a function of the tension."""
-
-    tensions: Array  # T_x [N], shape (t,)
-    magnitude: Array  # |T| at the platform end of the cable without stretch [N], shape (t,)
-    unstretchable: Array  # adjusting length d of a cable that does not stretch [m], shape (t,)
-    stretchable: Array  # adjusting length d_e of the elastic cable [m], shape (t,)
-    relieved: Array  # d_e plus the elongation |T| L/EA of the article (36) [m], shape (t,)
-    relieved_exactly: Array  # d_e plus the true elongation by the mean force along the cable [m], shape (t,)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class SagStudy:
-    """The article's sequence of regressions that begins with d and ends with k_p, for cables without stretch."""
+    """Sequence of regressions in the article that leads from the adjusting length d to the constant k_p."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities, t tensions
     adjusting_length: Array  # adjusting lengths d [m], shape (a, c, r, t)
@@ -168,80 +157,58 @@ class SagStudy:
 
     @property
     def fitted_length(self) -> Array:
-        """Adjusting length d by (41) [m], shape (a, c, r, t)."""
-        return self.a_d[..., None] * length_shape(self.sampling.tensions)
+        """Adjusting length d according to equation (41) [m], shape (a, c, r, t)."""
+        return self.a_d[..., None] * self.sampling.tensions**-2
 
     @property
     def fitted_a_d(self) -> Array:
-        """Factor a_d by (43) [m N^2], shape (a, c, r)."""
-        return self.q_a[:, None] * chord_shape(self.sampling.chords)[:, None]
+        """Factor a_d according to equation (43) [m N^2], shape (a, c, r)."""
+        return self.q_a[:, None] * self.sampling.chords[:, None] ** 3
 
     @property
     def fitted_q_a(self) -> Array:
-        """Factor q_a by (44) [N^2/m^2], shape (a, r)."""
-        return self.p_q * angle_shape(self.sampling.angles)[:, None]
+        """Factor q_a according to equation (44) [N^2/m^2], shape (a, r)."""
+        fitted: Array = self.p_q * np.cos(self.sampling.angles)[:, None] ** 4
+        return fitted
 
 
-def length_shape(tension: Array) -> Array:
-    """Function (41), 1/T_x^2 [1/N^2], to which d is proportional."""
-    return tension**-2
+def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> tuple[sl.CableState, sl.CableState, Array, Array]:
+    """States of a cable that does not stretch and of the elastic cable, and adjusting lengths [m] without elongation.
 
-
-def chord_shape(chord: Array) -> Array:
-    """Function (43), D^3 [m^3], to which a_d is proportional."""
-    return chord**3
-
-
-def angle_shape(angle: Array) -> Array:
-    """Function (44), cos^4 of the chord's angle, to which q_a is proportional."""
-    shape: Array = np.cos(angle) ** 4
-    return shape
-
-
-def density_shape(density: Array) -> Array:
-    """Function (45), rho^2 [kg^2/m^2], to which p_q is proportional."""
-    return density**2
-
-
-def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
-    """Adjusting lengths of a cable without its elongation: by (36) and (38), and with the true elongation."""
-    # The elongation by the force at the platform end, |T| L/EA, is too large by w L^2 sin(phi)/(2 EA), because half of
-    # the cable's weight acts along the chord (erratum 5). Source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8
-    # and 9
+    The adjusting lengths are those of the elastic cable, plus the elongation by equations (36) and (38), and plus the
+    true elongation.
+    """
+    # The force at the platform end gives an elongation |T| L/EA that is too large by w L^2 sin(phi)/(2 EA), because the
+    # mean force is smaller by half of the weight's part along the chord (erratum 5). Source: Gia Luan & Truong Thinh
+    # 2020, (33) to (38), figures 8 and 9
     model, chord_tension = sl.Catenary(), tensions * end.chord / end.span
     stiff = model.from_tension(cable.replace(axial_stiffness=UNSTRETCHABLE), *end, chord_tension, GRAVITY)
     soft = model.from_tension(cable, *end, chord_tension, GRAVITY)
     mean_force = np.hypot(soft.horizontal_tension, soft.vertical_force - 0.5 * soft.cable_weight)
     stretch = soft.unstrained_length / cable.axial_stiffness
-    return StretchStudy(
-        tensions=stiff.horizontal_tension,
-        magnitude=stiff.platform_end_tension,
-        unstretchable=stiff.adjusting_length,
-        stretchable=soft.adjusting_length,
-        relieved=soft.adjusting_length + soft.platform_end_tension * stretch,
-        relieved_exactly=soft.adjusting_length + mean_force * stretch,
-    )
+    printed, right = (soft.adjusting_length + force * stretch for force in (soft.platform_end_tension, mean_force))
+    return stiff, soft, printed, right
 
 
 def sag_study(sampling: Sampling) -> SagStudy:
-    """The regressions (41), (43), (44), (45) of the article, one after the other."""
+    """Regressions (41), (43), (44) and (45) of the article, in this order."""
     # source: Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15
     excess = sampling.hang().adjusting_length
-    a_d = fit_factor(length_shape(sampling.tensions), excess)
-    q_a = fit_factor(chord_shape(sampling.chords)[:, None], a_d, axis=-2)
-    p_q = fit_factor(angle_shape(sampling.angles)[:, None], q_a, axis=-2)
+    a_d = fit_factor(sampling.tensions**-2, excess)
+    q_a = fit_factor(sampling.chords[:, None] ** 3, a_d, axis=-2)
+    p_q = fit_factor(np.cos(sampling.angles)[:, None] ** 4, q_a, axis=-2)
     return SagStudy(
         sampling=sampling,
         adjusting_length=excess,
         a_d=a_d,
         q_a=q_a,
         p_q=p_q,
-        k_p=float(fit_factor(density_shape(sampling.densities), p_q)),
+        k_p=float(fit_factor(sampling.densities**2, p_q)),
     )
 
 
 class Constants(NamedTuple):
-    """Constants from the regressions for one range of tensions."""
+    """Constants of the empirical model that the regressions give for one range of sampled tensions."""
 
     lowest: float  # lowest sampled T_x [N]
     highest: float  # highest sampled T_x [N]
@@ -251,7 +218,7 @@ class Constants(NamedTuple):
 
 
 def constants(sampling: Sampling) -> Constants:
-    """Both constants from the article's regressions, for sampled cables."""
+    """Constants k_h and k_p that the regressions of the article give for sampled cables."""
     platform, frame = intercept_studies(sampling)
     tensions = sampling.tensions
     return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, sag_study(sampling).k_p)
@@ -259,16 +226,15 @@ def constants(sampling: Sampling) -> Constants:
 
 @cache
 def published_sampling() -> Sampling:
-    """Assumed samples of the article, in the range of tensions that gives the published constants."""
+    """Assumed samples of the article, with the range of tensions that leads to the published constants."""
     sampling = article_sampling()
     found = published_range(sampling)
     return sampling.between(found.lowest, found.highest)
 
 
 def published_range(sampling: Sampling) -> Constants:
-    """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385."""
-    # The two ends of the range determine the two constants: if the lower end increases, k_p decreases; if the upper end
-    # increases, |k_h| increases.
+    """Range of tensions for which the regressions give k_h = -4.845 at the frame end and k_p = 4.385, as published."""
+    # k_p decreases if the lower end of the range increases. |k_h| increases if the upper end increases.
     from scipy.optimize import brentq
 
     def best_lowest(highest: float) -> float:
@@ -284,7 +250,7 @@ def published_range(sampling: Sampling) -> Constants:
 
     try:
         highest = float(np.exp(brentq(missing, *np.log(HIGHEST), xtol=1e-8)))
-    except ValueError:  # there is no change of sign between the ends of the search
+    except ValueError:  # no range of tensions within the search intervals gives the constants
         raise sl.InvalidValueError(
             "the sampled cables",
             "cables for which no range of tensions gives the published constants",

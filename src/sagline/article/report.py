@@ -19,9 +19,9 @@ from sagline.article.simulation import ERROR_BAND
 from sagline.core.numbers import n
 from sagline.files.writing import check_files, plain
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Chapter, Panel, page, write_page
+from sagline.present.page import Chapter, Finding, Panel, page, write_page
 
-NAMES = ("article.html", "article.json")  # either both files are written or none
+NAMES = ("article.html", "article.json")  # if one file cannot be written, neither is written
 TITLE = "The article, reproduced"
 LEAD = (
     "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
@@ -36,30 +36,33 @@ NOTATION = (
 Progress = Callable[[int, int, str], None]
 _numbers = re.compile(r"(\d+)(?:-(\d+))?")
 REDONE = "3-15, 17-22 and 25-27; the others are drawings and photographs without data"
-KEY = "five-models"  # key of the finding with the numbers of the drawing
-FIRST, LAST = 1e-3, 1e4  # limits of the axis [mm]; a text at the edge replaces smaller values
+KEY = "five-models"  # key of the finding that contains the numbers of the drawing
+FIRST, LAST = 1e-3, 1e4  # limits of the axis [mm]; for smaller values, a text is written at the edge
 ROBOTS = (("suspended", BLUE, -0.16), ("mixed", VERMILLION, 0.16))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArticleReport:
-    """A written report."""
+    """A report that was written: its files, chapters and numbers."""
 
     page: Path  # the HTML file
     data: Path  # the JSON file of its numbers
-    chapters: tuple[Chapter, ...]  # number of chapters
+    chapters: tuple[Chapter, ...]  # chapters of the report
     numbers: dict[str, dict[str, Any]]  # unformatted numbers by chapter and finding
 
 
 def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
     """Repeat the studies of the article, and write a self-contained HTML page and a JSON file with its numbers."""
-    wanted = selection(parts)
+    selected, wanted = selection(parts)
     check_files(folder, NAMES)
     chapters = []
-    for done, part in enumerate(wanted.parts):
+    for done, part in enumerate(selected):
         if progress is not None:
-            progress(done, len(wanted.parts), part.key)
-        chapters.append(wanted.cut(part.build()))
+            progress(done, len(selected), part.key)
+        chapter = part.build()
+        if part.key not in wanted:
+            chapter = replace(chapter, findings=tuple(f for f in chapter.findings if wanted & _numbers_of(f)))
+        chapters.append(chapter)
     if progress is not None:
         progress(len(chapters), len(chapters), "done")
     numbers = {c.key: {finding.key: plain(finding.numbers) for finding in c.findings} for c in chapters}
@@ -69,7 +72,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
 
 
 class ReportPart(NamedTuple):
-    """A chapter that can be selected."""
+    """A chapter of the report that a user can select."""
 
     key: str  # name of the chapter
     figures: tuple[int, ...]  # figures of the article in the chapter
@@ -97,55 +100,37 @@ PARTS = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Selection:
-    """The chapters, figures and tables that are requested."""
-
-    whole: frozenset[str]  # keys of completely requested chapters
-    figures: frozenset[int]  # numbers of requested figures
-    tables: frozenset[int]  # numbers of requested tables
-
-    @property
-    def parts(self) -> tuple[ReportPart, ...]:
-        """The chapters that have requested findings."""
-        return tuple(
-            p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables}
-        )
-
-    def cut(self, chapter: Chapter) -> Chapter:
-        """The chapter, with only the findings that are requested."""
-        if chapter.key in self.whole:
-            return chapter
-        kept = (f for f in chapter.findings if self.figures & {*f.figures} or self.tables & {*f.tables})
-        return replace(chapter, findings=tuple(kept))
+Wanted = set[str | tuple[str, int]]  # keys of whole chapters; figures and tables, such as ("figures", 6)
 
 
-def selection(words: Sequence[str]) -> _Selection:
-    """Chapters, figures and tables that the words of the command select; no words select everything."""
-    if not words:
-        return _Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
-    whole: set[str] = set()
-    wanted: dict[str, set[int]] = {"figures": set(), "tables": set()}
+def selection(words: Sequence[str]) -> tuple[list[ReportPart], Wanted]:
+    """Chapters with a finding that the command's arguments `words` select, and the selection; default: everything."""
+    wanted: Wanted = set() if words else {part.key for part in PARTS}
     kind, open_word = "figures", ""
     for word in (w for text in words for w in text.replace(",", " ").split()):
         lower = word.lower()
         if lower.removesuffix("s") in {"figure", "table"}:
             kind = open_word = f"{lower.removesuffix('s')}s"
         elif found := _numbers.fullmatch(word):
-            wanted[kind] |= _checked_range(kind, word, int(found[1]), int(found[2] or found[1]))
+            wanted |= _checked_range(kind, word, int(found[1]), int(found[2] or found[1]))
             open_word = ""
         elif lower in {part.key for part in PARTS}:
-            whole.add(lower)
+            wanted.add(lower)
         else:
             raise _unknown(word)
     if open_word:
         raise sl.InvalidValueError(open_word, "without numbers", f"{open_word} 6-9", "Give numbers after this word.")
-    return _Selection(frozenset(whole), frozenset(wanted["figures"]), frozenset(wanted["tables"]))
+    return [part for part in PARTS if part.key in wanted or wanted & _numbers_of(part)], wanted
 
 
-def _checked_range(kind: str, word: str, first: int, last: int) -> set[int]:
-    known = {number for part in PARTS for number in getattr(part, kind)}
-    numbers = set(range(first, last + 1)) if last < 100 else set()
+def _numbers_of(part: ReportPart | Finding) -> Wanted:
+    """Figures and tables of a chapter or of a finding."""
+    return {(kind, number) for kind in ("figures", "tables") for number in getattr(part, kind)}
+
+
+def _checked_range(kind: str, word: str, first: int, last: int) -> Wanted:
+    numbers: Wanted = {(kind, number) for number in range(first, last + 1)} if last < 100 else set()
+    known = {number for part in PARTS for number in _numbers_of(part)}
     if not numbers & known:
         allowed = REDONE if kind == "figures" else "2; Table 1 is in the presets"
         raise sl.InvalidValueError(f"{kind} {word}", "not repeated here", allowed, "Give one of these.")
@@ -160,7 +145,7 @@ def _unknown(word: str) -> sl.InvalidValueError:
 
 
 def _picture(chapters: Sequence[Chapter]) -> Panel | None:
-    """Drawing of each model's largest position error, for both robots; None if the chapter has no position errors."""
+    """Drawing of the largest position error of each model for both robots; None without the chapter of simulations."""
     numbers = next((f.numbers for c in chapters for f in c.findings if f.key == KEY), None)
     if numbers is None:
         return None
@@ -174,7 +159,7 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
         for k, error in enumerate(errors):
             text = n(error, ".2g", "mm", size=1e3 * numbers["longest_length_m"])
             place, away = (max(error, FIRST), k + shift), -7.0 if FIRST < error < 1e3 * ERROR_BAND else 7.0
-            side = "left" if away > 0.0 else "right"  # key of the line for the article
+            side = "left" if away > 0.0 else "right"  # position of the label of the article's line
             ax.annotate(text, place, (away, 0.0), textcoords="offset points", fontsize=NAME_SIZE, va="center", ha=side)
     ax.set_xscale("log")
     ax.set_xlim(FIRST, LAST)

@@ -28,15 +28,15 @@ from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION, Sheet, dra
 from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
-# The article's (55) selects the tensions closest to the previous ones. In its figures, however, cables that are not
-# needed are near their minimum, and curves return to their initial values. Both agree with the minimum norm of the
-# article's variable T_x.
+# Equation (55) of the article selects the tensions that are closest to the previous tensions. The figures of the
+# article show another method: tensions of cables that are not needed are near their minimum, and curves return to their
+# initial values. Tensions with the minimum norm of T_x have both properties.
 METHOD = sl.MinimumNorm("horizontal")
 ERROR_BAND = 6e-3  # [m], the article's "(-6, 6) mm"
 
 
 class Figures(NamedTuple):
-    """Numbers of a run; only feasible poses count."""
+    """Summary of one robot along the path with one model; only feasible poses count."""
 
     error_max: float  # largest distance of the platform from the planned position [m]
     error_mean: float  # mean distance [m]
@@ -46,7 +46,7 @@ class Figures(NamedTuple):
     vertical_max: float  # largest |T_z| [N]
     step_max: float  # largest change of T_x between two samples [N]
     slope_max: float  # largest |dT_x/dt| [N/s]
-    # largest change of dT_x/dt between two steps [N/s]; at a kink of T_x, smaller steps do not reduce it
+    # largest change of dT_x/dt between two steps [N/s]; smaller steps do not reduce the change at a kink of T_x
     slope_jump: float
     length_min: float  # smallest L [m]
     length_max: float  # largest L [m]
@@ -58,21 +58,21 @@ class Figures(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathStudy:
-    """Both robots along the same path."""
+    """Simulation of both robots along the same path with several cable models."""
 
     path: sl.Path
     models: tuple[sl.CableModel, ...]
-    suspended: tuple[sl.Confirmation, ...]  # plan and exact equilibria of the first configuration, one per model
-    mixed: tuple[sl.Confirmation, ...]  # plan and exact equilibria of the second configuration, one per model
+    suspended: tuple[sl.Confirmation, ...]  # results for the first configuration, one per model
+    mixed: tuple[sl.Confirmation, ...]  # results for the second configuration, one per model
 
     def of(self, kind: type[sl.CableModel]) -> tuple[sl.Confirmation, sl.Confirmation]:
-        """Runs of both robots with one model."""
+        """Results of both robots with the model of the type `kind`."""
         k = [type(model) for model in self.models].index(kind)
         return self.suspended[k], self.mixed[k]
 
     @property
     def tension_ratio(self) -> float:
-        """Highest T_x of the mixed robot, divided by that of the suspended robot, with the empirical model."""
+        """Highest T_x of the mixed robot divided by highest T_x of the suspended robot, with the empirical model."""
         suspended, mixed = (figures(run) for run in self.of(sl.Empirical))
         return mixed.tension_max / suspended.tension_max
 
@@ -80,8 +80,8 @@ class PathStudy:
 def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
     """Plan both robots along the article's path, and find the equilibria of exact cables with the planned lengths.
 
-    The plan is the "simple controller" of the article, which computes lengths from tensions. The resulting pose of the
-    platform is the equilibrium on exact cables, with the same inertial forces.
+    The lengths are planned as in the "simple controller" of the article, which computes lengths from tensions. The
+    actual pose is the equilibrium of exact cables with the planned lengths and the same inertial forces.
 
     Source:
         Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
@@ -93,8 +93,8 @@ def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) ->
 
 
 def low_tension_study(limits: Array, rate: float = 10.0) -> tuple[Array, list[Figures]]:
-    """Largest errors along one axis [m], (2, k), at lower tension limits [N], and numbers for the bound (54)."""
-    # study of the empirical model with both robots; cables may become slack; T_adj of the bound is 0
+    """Largest errors (2, k) [m] along any axis of two robots with k lower tension limits; results for bound (54)."""
+    # Both robots are planned with the empirical model. Cables may become slack. The bound (54) has T_adj = 0.
     path, robots = sl.article_path(rate), [sl.load_robot(name) for name in ROBOTS]
     errors = [
         [figures(_run(robot.replace(tension_min=low), path, sl.Empirical(), METHOD)).axis_error_max for low in limits]
@@ -107,7 +107,7 @@ def low_tension_study(limits: Array, rate: float = 10.0) -> tuple[Array, list[Fi
 
 
 def figures(run: sl.Confirmation) -> Figures:
-    """Numbers of a run."""
+    """Summary of the errors, tensions and lengths of one robot along the path."""
     plan, good = run.plan, np.atleast_1d(run.plan.feasible & run.held)
     if not good.any():
         return Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)
@@ -150,9 +150,9 @@ def _smoothness(run: sl.Confirmation) -> dict[str, float]:
 LIMITS = np.array(
     [15.0, 17.0, 18.0, 18.5, 19.0, 19.5, 20.0, 22.5, 25.0, 30.0, 40.0, 50.0]
 )  # lower limits of the chord tension in the study [N]
-CORNER = (5.0, 3.5, 1.5)  # corner of the path, from which distances are measured [m]
+CORNER = (5.0, 3.5, 1.5)  # corner of the path [m], to which the figure refers
 FLOOR = 1e-9  # smallest drawn distance [m]
-NEAR = 1.05  # a tension is near its minimum if it is below this multiple of the lower limit
+NEAR = 1.05  # a tension is near its minimum if it is less than this multiple of the lower limit
 
 
 def simulation_chapter() -> Chapter:

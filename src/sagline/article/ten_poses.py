@@ -1,4 +1,4 @@
-"""Table 2 and figure 27: ten measured poses of the prototype, and possible causes of their errors."""
+"""Study of Table 2 and figure 27: ten measured poses of the prototype, and possible causes of the errors."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from sagline.motion.rest_to_rest import QUINTIC
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table2:
-    """The article's Table 2, as printed."""
+    """Table 2 of the article with the printed values."""
 
     points: tuple[str, ...]  # names of the poses, shape (10,)
     desired: Array  # desired positions [m], shape (10, 3)
@@ -74,23 +74,23 @@ class TenPoses:
     """The ten poses, their errors, and possible explanations of these errors."""
 
     table: Table2
-    plan: sl.Plan  # the prototype's plan for the ten poses, with the empirical model
-    home: sl.Plan  # the plan of the prototype's home pose
+    plan: sl.Plan  # plan of the prototype for the ten poses, with the empirical model
+    home: sl.Plan  # plan of the prototype for its home pose
     model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
-    height_line: FittedLine  # least-squares line of the measured vertical error over the height of the pose
-    # actual minus desired positions for a typical error of one parameter [m], (10, 3), by the parameter's name
+    height_line: FittedLine  # least-squares line: measured vertical error as a function of the height of the pose
+    # name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3)
     trends: dict[str, Array]
-    # all explanations by one, two and three parameters; each group is sorted by the remaining error
+    # all explanations by one parameter, by two and by three parameters; each list is sorted by the remaining error
     explanations: tuple[tuple[Explanation, ...], ...]
-    # effect of a pulley radius: share that a length offset and an anchor height reproduce together, as a
-    # ratio of the lengths of vectors
+    # share of a pulley radius's effect that errors of length offset and anchor height together can reproduce (ratio of
+    # vector norms)
     imitated: float
     single_zero: Array  # standard deviations of the length offsets of all cables [m], shape (m,)
-    dead_meter: Array  # actual minus desired position that 1 m of dead length would cause [m], shape (10, 3)
+    dead_meter: Array  # actual minus desired positions that 1 m of dead length would cause [m], shape (10, 3)
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
     def height_slope(self, error: Array) -> float:
-        """Slope of the vertical part of `error` (10, 3) [m] over the height of the poses [mm/m]."""
+        """Slope [mm/m] of a line that is fitted to the vertical `error` (10, 3) [m] over the height of the poses."""
         return float(fit_line(self.table.desired[:, 2], 1e3 * error[:, 2]).slope)
 
     def best(self, count: int) -> Explanation:
@@ -98,14 +98,14 @@ class TenPoses:
         return self.explanations[count - 1][0]
 
     def explanation(self, *names: str) -> Explanation:
-        """The explanation by the parameters with the names `names`."""
+        """Explanation by the parameters that are named `names`."""
         return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
 
 
 def ten_poses(most: int = 3) -> TenPoses:
     """Plan the prototype at the ten poses, and search for possible causes of the measured errors."""
-    # Every model with up to three parameters is fitted with the exact machine, within plausible limits. No fit can be
-    # better than 0.3 mm, because the printed positions are in whole millimeters.
+    # The fits use exact cables and all sets of up to three parameters, within plausible limits. The remaining error is
+    # at least 0.3 mm, because the printed positions are in whole millimeters.
     table, robot = table2(), sl.load_robot("article-prototype")
     plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 
@@ -145,7 +145,7 @@ def _planned(robot: sl.Robot, positions: Array) -> sl.Plan:
 
 
 def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> tuple[float, Array]:
-    """Limits of ten poses, computed near the best explanation by two parameters: `imitated` and `single_zero`."""
+    """Values of `imitated` and `single_zero`, computed near the best explanation by two parameters."""
     at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
     three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
     ((_, slopes),) = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])

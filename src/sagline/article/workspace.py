@@ -1,4 +1,4 @@
-"""Chapter about the article's future work: the boundary of the workspace, with and without sag."""
+"""Chapter about the boundary of the workspace with and without sag, a topic that the article leaves to future work."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, table_of
 from sagline.workspaces.levels import Plane, slice_of
 
-CELLS = 24  # cells along the longest edge of the frame
+CELLS = 24  # number of cells of the grid along the longest edge of the frame
 HEIGHT = 3.0  # half the height of the frame [m]
 POINTS = 121  # number of points along each side of a slice
 
@@ -24,7 +24,7 @@ Pair: TypeAlias = tuple[sl.Workspace, sl.Workspace]  # workspaces with exact cat
 
 
 def workspace_chapter() -> Chapter:
-    """Chapter about volume and boundary of the workspaces of both simulated robots."""
+    """Chapter about the volumes and boundaries of the workspaces of both simulated robots."""
     pairs = {name: _pair(name) for name in ROBOTS}
     draw = Drawings("workspace")
     return chapter("workspace", (_volumes(pairs), _boundaries(pairs, draw)))
@@ -83,7 +83,7 @@ def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
 
 
 def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
-    """Drawing of both boundaries in a plane."""
+    """Drawing of the boundaries of both workspaces of `pair` in the plane `normal` = `at` [m]."""
     exact, straight = pair
     plane, box = Plane(normal, at), exact.box
     first, second = plane.axes
@@ -98,7 +98,7 @@ def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
 
 
 def _farthest(pair: Pair) -> float:
-    """Largest distance between both boundaries along rays from the middle of the frame [m]."""
+    """Largest distance [m] between the boundaries of both workspaces, along rays from the middle of the frame."""
     middle = np.array([0.0, 0.0, HEIGHT])
     ways = np.vstack((np.eye(3), -np.eye(3)))
     box = pair[0].box
@@ -107,7 +107,7 @@ def _farthest(pair: Pair) -> float:
     ends = []
     for space in pair:
         level = space.levels()(places.reshape(-1, 3)).reshape(reach.size, len(ways))
-        first = (level < 0.0).argmax(axis=0)  # index of the first outside position on each ray
+        first = (level < 0.0).argmax(axis=0)  # index of the first position outside the workspace on each ray
         row = np.arange(len(ways))
         inner, outer = level[first - 1, row], level[first, row]
         end = reach[first - 1] + (reach[first] - reach[first - 1]) * inner / (inner - outer)

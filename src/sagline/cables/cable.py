@@ -1,4 +1,4 @@
-"""Material of a cable: density, stiffness, diameter and creep; a small catalogue of ropes."""
+"""Material of cables: density, stiffness, diameter and creep; a catalogue of ropes."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from sagline.core.arrays import Array, broadcast_shape, checked, locked, spread
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, rule
 from sagline.core.memory import check_memory
-from sagline.kernels.cable.batch import creep_strains
+from sagline.kernels import creep_strains
 
 
 @frozen(eq=False, weakref_slot=False)
 class Cable:
-    """Material of one cable or of many cables. All given fields have one shape.
+    """Material of one cable or of many cables. All known fields have the same shape.
 
     Attributes:
         linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
-        axial_stiffness: Young's modulus times section area EA [N], shape (...), > 0.
-        diameter: Diameter of the rope [m], shape (...), > 0; None if not known. Only drums need it.
+        axial_stiffness: Axial stiffness EA, Young's modulus times section area [N], shape (...), > 0.
+        diameter: Diameter of the rope [m], shape (...), > 0; None if not known. Only drums need the diameter.
         expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None if not known.
 
     Raises:
-        InvalidValueError: If a density is negative. If a stiffness or diameter is not positive. If the shapes do not
+        InvalidValueError: If a density is negative; if a stiffness or diameter is not positive; if the shapes do not
             broadcast.
 
     Examples:
@@ -45,7 +45,7 @@ class Cable:
         array([44000., 44000.])
     """
 
-    __slots__: ClassVar[tuple[str, ...]]  # names of the fields, in order
+    __slots__: ClassVar[tuple[str, ...]]  # field names in the order of the constructor
 
     linear_density: Array = field(converter=given, metadata=rule("kg/m", low=0.0))
     axial_stiffness: Array = field(converter=given, metadata=rule("N", above=0.0))
@@ -53,7 +53,7 @@ class Cable:
     expansion: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("1/K"))
 
     def __attrs_post_init__(self) -> None:
-        """Check and broadcast the fields."""
+        """Check all fields, and broadcast the known fields to one shape."""
         values = {
             about.name: checked(value, about.name, **about.metadata)
             for about in fields(Cable)
@@ -75,22 +75,20 @@ class Cable:
         diameter: ArrayLike | None = None,
         expansion: ArrayLike | None = None,
     ) -> Cable:
-        """A cable from its Young's modulus and section area; all arguments broadcast to one shape (...).
+        """Create a cable from Young's modulus and section area; all arguments broadcast to one shape (...).
 
         Args:
             linear_density: Mass per unstrained length [kg/m], >= 0.
-            youngs_modulus: Young's modulus E of the whole rope [Pa], > 0. The modulus of the fibers or wires is larger.
-            section_area: Section area A to which E refers [m^2], > 0. For a rope, A is usually only the area of its
-                fibers or wires.
-            diameter: Diameter of the rope [m], > 0; None if unknown. The section area cannot be computed from the
-                diameter.
+            youngs_modulus: Young's modulus E of the rope [Pa], > 0, which is less than the modulus of its fibers.
+            section_area: Section area A for which E is stated [m^2], > 0; usually the area of fibers or wires alone.
+            diameter: Diameter of the rope [m], > 0; None if unknown. The diameter does not determine the section area.
             expansion: Coefficient of thermal expansion [1/K], or None.
 
         Returns:
             Cable of axial stiffness EA.
 
         Raises:
-            InvalidValueError: If a density is negative. If a modulus, area or diameter is not positive. If the shapes
+            InvalidValueError: If a density is negative; if a modulus, area or diameter is not positive; if the shapes
                 do not broadcast.
 
         Examples:
@@ -107,13 +105,13 @@ class Cable:
         return cls(linear_density, modulus * area, diameter=diameter, expansion=expansion)
 
     def replace(self, **changes: Any) -> Cable:
-        """A cable with the changed fields `changes`, which are checked as for a new cable.
+        """Copy of the cable with some fields changed; the constructor checks the copy.
 
         Args:
             changes: Fields of `Cable` and their new values.
 
         Returns:
-            A new cable. The original cable remains unchanged.
+            New cable; the original cable is unchanged.
 
         Raises:
             InvalidValueError: If a field does not exist, or the constructor does not accept the new values.
@@ -130,15 +128,15 @@ class Cable:
         return evolve(self, **changes)
 
     def known(self) -> dict[str, Array]:
-        """Known fields, by name.
+        """Names and values of the known fields.
 
         Returns:
-            linear_density, axial_stiffness, and diameter and expansion unless they are None.
+            Dictionary of the fields that are not None.
         """
         return {name: value for name in self.__slots__ if (value := getattr(self, name)) is not None}
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
-        """Material at `index` of a batch of shape `shape`. The same object if all poses have one material."""
+        """Material at `index` of a batch of shape `shape`; a material without batch axes is returned unchanged."""
         own = self.linear_density.shape
         if len(own) < len(shape):
             return self
@@ -151,7 +149,7 @@ class Cable:
         return part
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Array]]]:
-        """Pickle through the constructor, which checks and locks a loaded cable."""
+        """Pickle the cable as a call of the constructor, which checks the loaded fields and makes them read-only."""
         return _from_fields, (self.known(),)
 
 
@@ -164,15 +162,15 @@ MOST_ELEMENTS = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Creep:
-    """Creep strain of a cable: one or two Kelvin-Voigt elements (spring parallel to damper) in series with the cable.
+    """Creep of a cable: one or two Kelvin-Voigt elements (spring parallel to damper) in series with the cable.
 
-    The elastic cable and one element form the standard linear solid. The elastic cable and two elements form the
-    five-element model of polymer ropes. The creep is recoverable: without tension the strain returns to zero.
+    An elastic cable with one element is the standard linear solid. An elastic cable with two elements is the
+    five-element model of polymer ropes. The creep is recoverable: without tension, the creep strain returns to zero.
 
     Attributes:
         axial_stiffness: Stiffness k of each element [N], > 0, shape (1,) or (2,). Under a constant tension T, the
             strain of an element approaches T/k.
-        time: Retardation time of each element [s], > 0, of the same shape. After this time, the strain of the element
+        time: Retardation time of each element [s], > 0, shape (1,) or (2,). After this time, the strain of an element
             is 63 % (1 - 1/e) of T/k.
 
     Examples:
@@ -192,14 +190,14 @@ class Creep:
     time: Array
 
     def __init__(self, axial_stiffness: ArrayLike, time: ArrayLike) -> None:
-        """Check the elements.
+        """Check stiffness and retardation time of all elements.
 
         Args:
             axial_stiffness: Stiffness of each element [N], > 0: a number, or a list of one or two numbers.
             time: Retardation time of each element [s], > 0: a number, or a list of one or two numbers.
 
         Raises:
-            InvalidValueError: If a number is not positive, or there are more than two elements.
+            InvalidValueError: If a number is not positive, or if there are more than two elements.
         """
         stiffness = checked(axial_stiffness, "axial_stiffness", "N", above=0.0)
         delay = checked(time, "time", "s", above=0.0)
@@ -212,20 +210,20 @@ class Creep:
             object.__setattr__(self, name, locked(np.array(np.broadcast_to(values, shape))))
 
     def strain(self, time: ArrayLike, tension: ArrayLike, *, settled: bool = False) -> Array:
-        """Creep strain for a time series of tensions. Creep increases an unstrained length L to L (1 + strain).
+        """Creep strain for a time series of tensions. Creep changes an unstrained length L to L (1 + strain).
 
         The strain is exact for tensions that vary linearly between samples.
 
         Args:
             time: Times of the samples [s], increasing, shape (N,).
             tension: Tensions [N], shape (N,) or (N, m); NaN at a sample without a solution.
-            settled: True if the first tension has acted for a long time; if False, the strain starts at zero.
+            settled: True if the first tension has acted for a long time before; False if the initial strain is zero.
 
         Returns:
-            Strain, of the shape of `tension`; NaN where the tension is NaN.
+            Strain in the shape of `tension`; NaN where the tension is NaN.
 
         Raises:
-            InvalidValueError: If the times do not increase, or the shapes do not fit.
+            InvalidValueError: If the times do not increase, or if the shapes of `time` and `tension` do not fit.
         """
         clock = checked(time, "time", "s", shape=(None,))
         force = checked(tension, "tension", "N", missing=True)
@@ -242,16 +240,16 @@ class Creep:
         return locked(found.reshape(force.shape))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:
-        """Pickle through the constructor."""
+        """Pickle the object as a call of the constructor, which checks the loaded elements."""
         return Creep, (self.axial_stiffness, self.time)
 
 
-SAFETY = 5.0  # breaking force divided by the highest allowed tension; usual value for general lifting
+SAFETY = 5.0  # safety factor: breaking force divided by the largest allowed tension, usual for general lifting
 
 
 @dataclass(frozen=True, slots=True)
 class Rope:
-    """A type of rope whose properties are proportional to the square of its diameter.
+    """Type of rope in the catalogue, with properties that are proportional to the square of the diameter.
 
     Attributes:
         name: Name in the catalogue.
@@ -259,8 +257,8 @@ class Rope:
         density_factor: Linear density divided by the squared diameter [kg/m^3].
         stiffness_factor: Axial stiffness divided by the squared diameter [Pa].
         strength_factor: Breaking force divided by the squared diameter [Pa].
-        source: Source of the numbers.
-        assumed: Assumed values, and the reasons.
+        source: Document from which the numbers are taken.
+        assumed: Values that are assumed, with reasons.
     """
 
     name: str
@@ -272,17 +270,17 @@ class Rope:
     assumed: str
 
     def cable(self, diameter: float) -> Cable:
-        """A cable of this rope with the diameter `diameter` [m]."""
+        """Material of a cable of this rope type with the diameter `diameter` [m]."""
         square = float(checked(diameter, "diameter", "m", shape=(), above=0.0)) ** 2
         return Cable(self.density_factor * square, self.stiffness_factor * square, diameter=diameter)
 
     def breaking_force(self, diameter: float) -> float:
-        """Minimum breaking force [N] of a new rope with the diameter `diameter` [m]."""
+        """Minimum breaking force [N] of a new rope of this type with the diameter `diameter` [m]."""
         return self.strength_factor * diameter**2
 
 
 def _steel(name: str, construction: str, mass: float, section: float, strength: float) -> Rope:
-    """A steel rope from the factors of EN 12385-4: length mass W [kg/(100 m mm^2)], metallic section C, strength K."""
+    """Steel rope with the factors of EN 12385-4: length mass W [kg/(100 m mm^2)], metallic section C, strength K."""
     return Rope(
         name=name,
         description=f"steel wire rope {construction}, grade 1770",
@@ -295,7 +293,7 @@ def _steel(name: str, construction: str, mass: float, section: float, strength: 
 
 
 def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) -> Rope:
-    """A braided rope from the modulus [Pa] and the strength [Pa] of its fiber."""
+    """Braided rope of a fiber with the modulus `modulus` [Pa] and the strength `strength` [Pa]."""
     section = 0.7853981633974483 * _BRAID_FILL
     return Rope(
         name=name,
@@ -309,9 +307,9 @@ def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) 
     )
 
 
-_STEEL_MODULUS = 100e9  # modulus for the metallic section [Pa]
+_STEEL_MODULUS = 100e9  # [Pa], modulus that refers to the metallic section
 _BRAID_FILL = 2.0 / 3.0  # fiber area divided by the area of the circle with the nominal diameter
-_POLYETHYLENE = 975.0  # [kg/m^3], assumed: a common value of the fiber
+_POLYETHYLENE = 975.0  # [kg/m^3], assumed density of the fiber
 _DSM = "DSM Dyneema, fact sheet UHMWPE fiber, CIS YA100 (2010): {}; density 975 kg/m^3 assumed"
 
 ROPES: Final = MappingProxyType(

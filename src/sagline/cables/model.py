@@ -1,11 +1,11 @@
-"""Common interface of the cable models; states and statuses of cables."""
+"""Common interface of the cable models, and states of cables with status codes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,13 +17,14 @@ from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.core.indices import batch_length, part_of
 from sagline.core.memory import check_memory
 from sagline.core.results import Result, Status
-from sagline.kernels import codes
-from sagline.kernels.cable import batch
-from sagline.kernels.cable.terms import Terms
+from sagline.kernels import batch_from_length, batch_from_tension, closures, codes, largest_sags, shape_points, tables
+
+if TYPE_CHECKING:
+    from sagline.kernels.cable.terms import Terms
 
 
 class CableStatus(Status):
-    """Status of one cable; `text` states its meaning and the next step."""
+    """Status of a cable after a computation; `text` states its meaning and the next step."""
 
     SOLVED = codes.CABLE_SOLVED, "solved"
     SLACK = codes.CABLE_SLACK, "slack: the cable has no chord tension; a shorter length makes it taut"
@@ -45,10 +46,10 @@ _ARRAYS = ["span", "rise", "unstrained_length", "horizontal_tension", "vertical_
 
 @dataclass(frozen=True, slots=True)
 class CableModel:
-    """A cable model: a code and two parameters that the kernels understand.
+    """Base class of cable models: a code and two parameters for the kernels.
 
     Attributes:
-        code: Code of the equations in the kernels (`sagline.kernels.codes`).
+        code: Code that selects the equations in the kernels (`sagline.kernels.codes`).
         weightless: True if the model ignores the cable's weight.
     """
 
@@ -56,18 +57,18 @@ class CableModel:
     weightless: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse to create an object of the interface itself, which is not a cable model."""
+        """Refuse objects of the base class itself, which is not a cable model."""
         if type(self) is CableModel:
             step = "Choose one of the models, Catenary() for instance."
             raise InvalidValueError("CableModel()", "the abstract base class", "a cable model", step)
 
     @property
     def parameters(self) -> tuple[float, float]:
-        """Parameters k_h and k_p of the article; zero in other models."""
+        """Parameters k_h and k_p of the empirical model; zero for all other models."""
         return 0.0, 0.0
 
     def terms(self, gravity: float) -> Terms:
-        """Parameters of the model in the form for kernels.
+        """Parameters of the model for kernels.
 
         Args:
             gravity: Gravitational acceleration [m/s^2].
@@ -83,7 +84,7 @@ class CableModel:
     def from_tension(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, chord_tension: ArrayLike, gravity: float = 9.81
     ) -> CableState:
-        """Lengths and forces of cables with the chord tensions `chord_tension`.
+        """Compute lengths and forces of cables that have the chord tensions `chord_tension`.
 
         All arguments broadcast to one shape (...).
 
@@ -98,8 +99,8 @@ class CableModel:
             State with fields of shape (...).
 
         Raises:
-            CableGeometryError: If `span` is negative, or `span` and `rise` are both zero. InvalidValueError: If a
-                tension or `gravity` is negative or not finite. If the shapes do not broadcast.
+            CableGeometryError: If `span` is negative, or `span` and `rise` are both zero.
+            InvalidValueError: If a tension or `gravity` is negative or not finite; if the shapes do not broadcast.
 
         Examples:
             The state of a cable at one tension, then at three tensions:
@@ -119,14 +120,14 @@ class CableModel:
         """
         instance(cable, Cable, "cable")
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
-        buffer = np.empty((batch.BUFFERS, batch.CHUNK))
+        buffer = np.empty((tables.BUFFERS, tables.CHUNK))
         names = "chord_tension", "unstrained_length"
-        return self._solve(cable, span, rise, gravity, names, tension, batch.batch_from_tension, buffer)
+        return self._solve(cable, span, rise, gravity, names, tension, batch_from_tension, buffer)
 
     def from_length(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, unstrained_length: ArrayLike, gravity: float = 9.81
     ) -> CableState:
-        """Forces of cables with the unstrained lengths `unstrained_length`.
+        """Compute forces of cables that have the unstrained lengths `unstrained_length`.
 
         All arguments broadcast to one shape (...).
 
@@ -141,8 +142,8 @@ class CableModel:
             State with fields of shape (...).
 
         Raises:
-            CableGeometryError: If `span` is negative, or `span` and `rise` are both zero. InvalidValueError: If a
-                length is not positive. If `gravity` is negative. If the shapes do not broadcast.
+            CableGeometryError: If `span` is negative, or `span` and `rise` are both zero.
+            InvalidValueError: If a length is not positive; if `gravity` is negative; if shapes do not broadcast.
 
         Source:
             Irvine 1981, ch. 2; docs/model.md, sections 2 (P2) and 3.
@@ -150,7 +151,7 @@ class CableModel:
         instance(cable, Cable, "cable")
         length = checked(unstrained_length, "unstrained_length", "m", above=0.0)
         names = "unstrained_length", "chord_tension"
-        return self._solve(cable, span, rise, gravity, names, length, batch.batch_from_length)
+        return self._solve(cable, span, rise, gravity, names, length, batch_from_length)
 
     def _solve(
         self,
@@ -163,7 +164,7 @@ class CableModel:
         kernel: Callable[..., None],
         *work: Array,
     ) -> CableState:
-        """State of cables; `names`: names of the quantity `given`, and of the quantity that `kernel` computes."""
+        """State of cables from the values `given`; names: names of the given quantity and of the result of `kernel`."""
         span = _checked_span(span)
         rise = checked(rise, "rise", "m")
         gravity = number(gravity, "gravity", "m/s^2", low=0.0)
@@ -183,18 +184,18 @@ class CableModel:
         return CableState(model=self, cable=cable, gravity=gravity, **arrays)
 
     def profile(self, cable: Cable, state: CableState, points: int = 50) -> Array:
-        """Points along a cable of this model, in the vertical plane of the cable.
+        """Compute points along a cable of this model, in the vertical plane of the cable.
 
         Args:
             cable: Material.
-            state: Ends, length and forces of the cable, shape (...).
+            state: State with ends, length and forces of the cable, shape (...).
             points: Number of points at equal steps of unstrained length, >= 2.
 
         Returns:
             Horizontal and vertical coordinates relative to the frame end [m], shape (..., points, 2).
 
         Raises:
-            InvalidValueError: If `points` is less than two. If `cable` or `state` has the wrong type.
+            InvalidValueError: If `points` is less than two; if `cable` or `state` has the wrong type.
         """
         placed = replace(instance(state, CableState, "state"), model=self, cable=instance(cable, Cable, "cable"))
         return placed.points(whole_number(points, "points", 2))
@@ -208,26 +209,26 @@ def _checked_span(span: ArrayLike) -> Array:
 
 
 def _flat(field: Array, shape: tuple[int, ...]) -> Array:
-    """Flatten the operand `field` to one axis. It has one value per cable of the batch, or a single value."""
+    """Operand with one axis, from an array with one value per cable or with a single value for all cables."""
     return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)
 
 
 def _shaped(field: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """The field with the name `field`, of the result or of the inputs, in the shape of the batch, (...), read-only."""
+    """Read-only array of a field in the shape of the batch, (...)."""
     whole = field.size == math.prod(shape)
     return locked(field.reshape(shape) if whole else np.broadcast_to(field, shape))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CableState(Result):
-    """Ends, forces and lengths of cables: results of a cable model.
+    """State of cables that a cable model has computed: ends, forces and lengths.
 
-    Every array has shape (...), one entry per cable. Forces act on the cable at its platform end. A number, a slice, or
-    an array of numbers or booleans selects entries along the first axis of a batch. A slice shares the memory of the
-    batch.
+    Every array has the shape (...), with one entry per cable. Forces act on the cable at its platform end. A state can
+    be indexed along its first axis with a number, a slice, or an array of numbers or booleans. A slice shares the
+    memory of the original state.
 
     Attributes:
-        model: The cable model that was solved.
+        model: Cable model that has computed the state.
         cable: Material; its fields broadcast with shape (...).
         gravity: Gravitational acceleration [m/s^2].
         span: Horizontal distance from frame end to platform end [m].
@@ -236,7 +237,8 @@ class CableState(Result):
         horizontal_tension: T_x [N], >= 0.
         vertical_force: T_z [N], up positive.
         chord_tension: tau = T_x/cos phi [N].
-        status: Codes of `CableStatus`. Forces and lengths are NaN unless the code is SOLVED, SLACK or BELOW_VALIDITY.
+        status: Codes of `CableStatus`. Only cables with the code SOLVED, SLACK or BELOW_VALIDITY have forces and
+            lengths; all other cables have NaN.
     """
 
     model: CableModel
@@ -252,22 +254,22 @@ class CableState(Result):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of every array."""
+        """Shape (...) of every array."""
         return self.unstrained_length.shape
 
     def __len__(self) -> int:
-        """Length of the first axis."""
+        """Number of entries along the first axis."""
         return batch_length(self.shape, "state of a single cable")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
         """State of the cables that `index` selects along the first axis.
 
         Args:
-            index: A number (negative: from the end), a slice, or an array of numbers or booleans.
+            index: A number (negative numbers count from the end), a slice, or an array of numbers or booleans.
 
         Raises:
-            NoBatchError: If the state has only a single cable (also a TypeError).
-            NoSuchEntryError: If an entry does not exist (also an IndexError).
+            NoBatchError: If the state has only a single cable; the error is also a TypeError.
+            NoSuchEntryError: If an entry does not exist; the error is also an IndexError.
         """
         part = part_of(index, self.shape, "state of a single cable")
         arrays: dict[str, Any] = {name: locked(getattr(self, name)[part, ...]) for name in _ARRAYS}
@@ -279,7 +281,7 @@ class CableState(Result):
 
     @property
     def chord(self) -> Array:
-        """Chord D, the distance between the two ends [m]."""
+        """Chord D: distance between the two ends [m]."""
         return np.hypot(self.span, self.rise)
 
     @property
@@ -289,14 +291,14 @@ class CableState(Result):
 
     @property
     def cable_weight(self) -> Array:
-        """Weight of the whole cable in its model [N]; zero in the weightless models."""
+        """Weight of the whole cable [N]; zero in the weightless models."""
         if self.model.weightless:
             return np.zeros(self.shape)
         return self.cable.linear_density * self.gravity * self.unstrained_length
 
     @property
     def frame_end_tension(self) -> Array:
-        """Tension at the frame end [N], which the load cell of a winch measures."""
+        """Tension at the frame end [N], where load cells of winches measure."""
         return np.hypot(self.horizontal_tension, self.vertical_force - self.cable_weight)
 
     @property
@@ -306,16 +308,16 @@ class CableState(Result):
 
     @property
     def sag(self) -> Array:
-        """Largest vertical distance of the cable below its chord [m]. Below its lower end if the chord is vertical."""
-        return self._evaluate(batch.largest_sags)
+        """Largest vertical distance between chord and cable [m]; for a vertical chord, depth below the lower end."""
+        return self._evaluate(largest_sags)
 
     @property
     def closure_residual(self) -> Array:
-        """Closure error [m]: the error of the state in the equations of its cable model."""
-        return self._evaluate(batch.closures)
+        """Closure error [m]: error with which the state satisfies the equations of its cable model."""
+        return self._evaluate(closures)
 
     def points(self, count: int) -> Array:
-        """Points along the cable in its vertical plane.
+        """Compute points along the cable in its vertical plane.
 
         Args:
             count: Number of points at equal steps of unstrained length, >= 2.
@@ -328,10 +330,10 @@ class CableState(Result):
         """
         whole_number(count, "points", 2)
         check_memory("points", 16.0 * self.unstrained_length.size * count, "Choose fewer points.")
-        return locked(self._evaluate(batch.shape_points, count, 2))
+        return locked(self._evaluate(shape_points, count, 2))
 
     def _evaluate(self, kernel: Callable[..., None], *shape: int) -> Array:
-        """Results of `kernel` for all cables, (..., *shape)."""
+        """Results (..., *shape) of `kernel` for all cables of the state."""
         given = (self.span, self.rise, self.cable.linear_density, self.cable.axial_stiffness, self.unstrained_length)
         forces = (self.horizontal_tension, self.vertical_force, self.chord_tension)
         columns = tuple(kernel_input(field, self.shape).reshape(-1) for field in (*given, *forces))

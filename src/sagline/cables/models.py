@@ -1,4 +1,4 @@
-"""The five cable models, and a table of all of them by name."""
+"""The five cable models, and the models by name."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from typing import ClassVar
 from sagline.cables.model import CableModel
 from sagline.core.arguments import named
 from sagline.core.arrays import number
+from sagline.core.surface import ordered_classes
 from sagline.kernels import codes
 
 
-@dataclass(frozen=True, slots=True)
 class Straight(CableModel):
-    """A cable without elongation and sag: L = D.
+    """Straight cable without elongation and sag: L = D.
 
-    A length does not determine the tension. The tension is then NaN, and the closure residual is |L - D|.
+    The length of a straight cable does not determine its tension. A state from a given length has the tension NaN and
+    the closure residual |L - D|.
 
     Source:
         docs/model.md, section 3.
     """
 
+    __slots__ = ()
     code: ClassVar[int] = codes.STRAIGHT
     weightless: ClassVar[bool] = True
 
 
-@dataclass(frozen=True, slots=True)
 class Elastic(CableModel):
-    """A cable with elongation but without weight: L = D/(1 + tau/EA).
+    """Straight elastic cable without weight: L = D/(1 + tau/EA).
 
     If L >= D, the cable is slack and its tension is zero.
 
@@ -35,21 +36,23 @@ class Elastic(CableModel):
         docs/model.md, section 3.
     """
 
+    __slots__ = ()
     code: ClassVar[int] = codes.ELASTIC
     weightless: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, slots=True)
 class Empirical(CableModel):
-    """The article's closed form: T_z = tan(phi) T_x + k_h rho D, and L as a function of T_x by equation (48).
+    """Empirical model of the article: T_z = tan(phi) T_x + k_h rho D, and L as a function of T_x by equation (48).
 
-    The model is valid if the lowest point of the cable is outside the span, T_x > w D/(2 |tan phi|). Results for
-    smaller T_x have the status BELOW_VALIDITY. For a given length, T_x is on the decreasing branch of (48).
+    The model is valid if the lowest point of the cable is outside the span: T_x > w D/(2 |tan phi|). Results with a
+    smaller T_x have the status BELOW_VALIDITY. For a given length, the solution is on the branch of (48) on which L
+    decreases with T_x.
 
     Attributes:
-        k_h: Intercept constant [m/s^2]. The default is the magnitude of the published value, 4.845; theory gives g/2
-            for a shallow cable.
-        k_p: Sag constant [m^2/s^4]. The default is the published value 4.385; theory gives g^2/24 for a shallow cable.
+        k_h: Intercept constant [m/s^2]. The default is the published magnitude, 4.845; theory gives g/2 for a small
+            sag.
+        k_p: Sag constant [m^2/s^4]. The default is the published value, 4.385; theory gives g^2/24 for a small sag.
 
     Source:
         Gia Luan & Truong Thinh 2020, equations (21), (27), (28), (45), (48); docs/model.md, section 3.
@@ -60,52 +63,45 @@ class Empirical(CableModel):
     k_p: float = 4.385
 
     def __post_init__(self) -> None:
-        """Check the constants."""
+        """Check the two constants."""
         object.__setattr__(self, "k_h", number(self.k_h, "k_h", "m/s^2"))
         object.__setattr__(self, "k_p", number(self.k_p, "k_p", "m^2/s^4", low=0.0))
 
     @property
     def parameters(self) -> tuple[float, float]:
-        """k_h and k_p."""
+        """Constants k_h and k_p of the model."""
         return self.k_h, self.k_p
 
 
-@dataclass(frozen=True, slots=True)
 class Parabolic(CableModel):
-    """First-order shallow cable: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
+    """First order in the sag: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
 
-    For a given length, tau is the positive root of a cubic equation.
+    If the length is given, tau is the positive root of a cubic equation.
 
     Source:
         docs/model.md, section 3.
     """
 
+    __slots__ = ()
     code: ClassVar[int] = codes.PARABOLIC
 
 
-@dataclass(frozen=True, slots=True)
 class Catenary(CableModel):
-    """Irvine's elastic catenary, solved to rounding error in both directions. The default cable model.
+    """Elastic catenary, solved up to rounding errors for a given tension or length. The default cable model.
 
     Source:
         Irvine 1981, ch. 2; cancellation-free forms in docs/model.md, section 2.
     """
 
+    __slots__ = ()
     code: ClassVar[int] = codes.CATENARY
 
 
-MODELS: dict[str, type[CableModel]] = {
-    model.__name__: model  # in the order of increasing accuracy
-    for model in (
-        Straight,
-        Elastic,
-        Empirical,
-        Parabolic,
-        Catenary,
-    )
-}
+def models_by_name() -> dict[str, type[CableModel]]:
+    """Classes of the cable models by name, in the order of `__init__.pyi`."""
+    return ordered_classes("sagline.cables")
 
 
 def model_of(value: CableModel | str, item: str = "model") -> CableModel:
-    """Return a cable model unchanged. A name such as "elastic" is converted to a cable model."""
-    return named(value, CableModel, MODELS, item)
+    """Cable model `value`, or the cable model with the name `value`, such as "elastic"."""
+    return named(value, CableModel, models_by_name(), item)

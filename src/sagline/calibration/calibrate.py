@@ -3,39 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary, model_of
+from sagline.cables.models import Catenary, Straight, model_of
 from sagline.calibration import diagnostics
 from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
 from sagline.calibration.log import Sensors, WinchLog
 from sagline.calibration.parameters import (
+    DEFAULT,
     OF_CELLS,
+    OF_FORCES,
     Parameters,
     Unknown,
     checked_unknowns,
-    default_unknowns,
+    internal,
     parameters_of,
 )
-from sagline.calibration.problem import FitProblem, readings_table
+from sagline.calibration.problem import FitProblem, SearchState, held_lengths, readings_table, start_of
 from sagline.calibration.result import Calibration
-from sagline.calibration.screening import reading_count, screen
+from sagline.calibration.screening import SPEED_LIMIT, moving_rows, reading_count, screen
 from sagline.calibration.search import cross_validate, search_from_priors
+from sagline.calibration.straight import rotation_error
 from sagline.core.arguments import callback, flag, instance, whole_number
-from sagline.core.arrays import Indices, locked
+from sagline.core.arrays import Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.numbers import counted
+from sagline.core.numbers import counted, n
 from sagline.core.progress import Progress
 from sagline.kernels import codes
+from sagline.robot.batch import refuse_slanted
 from sagline.robot.robot import Robot
+from sagline.statics.tables import pose_rows
 
 _CATENARY = Catenary()
-MOST_FOLDS: Final = 1000  # parts of the cross-validation; each part takes the time of one calibration
+# [rad] Straight cables: rotations that no reading determines to this accuracy are assumed to be as commanded, or level,
+# with this standard deviation. Cables of a suspended or planar platform hold it level to about a degree.
+LEVEL: Final = 0.02
+FEW_KEPT: Final = 0.5  # if the screening keeps a smaller share of the rows, the cause is searched
+MOST_FOLDS: Final = 1000  # largest number of parts in a cross-validation; each part needs one calibration
 
 
 def calibrate(
@@ -50,30 +60,33 @@ def calibrate(
 ) -> Calibration:
     """Estimate anchors, length zeros and cable properties of a robot from its own readings, with standard errors.
 
-    The estimate is a nonlinear least-squares problem with exact cables. Its variables are the parameters and the true
-    lengths at every pose. Reported lengths are weighted by the deviation in `log.sensors`. Parameters that the readings
-    do not observe keep the values of the robot, and are listed.
+    The estimate is a nonlinear least-squares problem with exact cables. The variables of the problem are the parameters
+    and the true lengths at every pose. Reported lengths are weighted by the deviation in `log.sensors`. A parameter on
+    which no reading depends keeps the value of `robot`, and is listed in the result.
 
     Args:
-        robot: The robot before the calibration. Its values are the initial values and the priors. The standard
-            deviation of a prior is the first available value of these: `Unknown(name, deviation=...)`, the robot's
-            tolerance, a typical value of the kind.
+        robot: The robot before the calibration, whose values are the initial values and the priors. The standard
+            deviation of a prior is `Unknown(name, deviation=...)` if given, else the robot's tolerance, else a typical
+            value.
         log: Readings at poses at rest.
-        unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s. None for
-            frame anchors, length zeros, axial stiffness, mass and center of mass; and, if load cells are read, their
-            gains and biases.
-        model: Cable model, exact or without weight.
+        unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s. "default"
+            means frame anchors, length zeros, axial stiffness, mass and center of mass and, if load cells are
+            read, their gains and biases; for straight cables, frame anchors and length zeros. None is the same as
+            "default" alone. With "clock_offset", the time by which lengths are late, moving rows with a measured pose
+            are also used, without their load cells.
+        model: Cable model, exact, without weight, or straight. With straight cables, poses are fitted to the lengths
+            and to measured poses without a force balance. Load cells are not used, and rows in motion are used.
         robust: True to reduce the weight of poses that do not fit the other poses.
-        folds: Number of parts of the poses for the cross-validation, at most one per pose; each part takes the time of
-            one calibration. 0 for no cross-validation.
+        folds: Number of parts into which a cross-validation divides the poses, at most the number of poses; one more
+            calibration is needed per part. 0 for no cross-validation.
         progress: Called with the number of finished poses of a pass and the number of all poses.
 
     Returns:
         Calibration; its `robot` is the calibrated robot.
 
     Raises:
-        InvalidValueError: If an unknown has another name, or neither readings nor a prior; if the log does not fit this
-            robot, has swapped cables or wrong units, or has fewer readings than unknowns. The message names the reason.
+        InvalidValueError: If an unknown does not exist, or has neither readings nor a prior; if `log` does not fit this
+            robot, has swapped cables or wrong units, or has fewer readings than unknowns.
 
     Examples:
         >>> import numpy as np
@@ -102,21 +115,38 @@ def calibrate(
     robust = flag(robust, "robust")
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
-    checked = None if unknowns is None else checked_unknowns(unknowns)  # before any other work
+    wanted = (DEFAULT,) if unknowns is None else unknowns
+    straight = model.code == codes.STRAIGHT
+    named = [one.name for one in checked_unknowns(wanted, log.sensors, straight=straight)]  # before any other work
+    timed = "clock_offset" in named
     _refuse(diagnostics.wrong_units(robot, log))
-    fit_log, rows, left_out = screen(robot, log)
+    usable, motion = moving_rows(robot, log) if timed or straight else (None, None)
+    limit, free = (SPEED_LIMIT, usable) if timed or not straight else (np.inf, None)
+    fit_log, rows, left_out = screen(robot, log, limit, free)
+    if timed and usable is not None:
+        fit_log = _without_inertia(fit_log, usable[rows])
+    if straight:
+        log, fit_log = (one.replace(load_cells=None) for one in (log, fit_log))
+    if straight and fit_log.rotation is None:
+        log, fit_log = _with_assumed_rotations(robot, model, log, fit_log, wanted)
     sensors = active_sensors(fit_log)
-    asked = checked_unknowns(default_unknowns(sensors)) if checked is None else checked
+    asked = _with_relative_lengths(log, checked_unknowns(wanted, sensors, straight=straight))
     parameters = parameters_of(robot, asked, sensors, counted=log.counts is not None)
-    _check_count(fit_log, parameters, left_out, freely=checked is not None)
-    problem = FitProblem(robot, model, sensors, parameters, readings_table(fit_log))
+    more = fit_log.readings.size - len(fit_log) * len(robot.freedom) if straight else 0
+    _check_count(fit_log, parameters, left_out, more, freely=DEFAULT not in wanted)
+    moved = None if motion is None or not motion.any() else motion[:, rows]
+    table = readings_table(fit_log)._replace(motion=moved)
+    problem, geometric = FitProblem(robot, model, sensors, parameters, table), None
+    if not straight and fit_log.load_cells is None and fit_log.position is not None:
+        geometric = _geometric_start(problem, log, rows, asked)
     try:
-        fit, kept, lost = search_from_priors(problem, fit_log.commanded, robust=robust, progress=progress)
+        fit, kept, lost = search_from_priors(problem, fit_log.commanded, geometric, robust=robust, progress=progress)
     except InvalidValueError:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
         raise
     departure = float(np.abs(problem.missed(fit.state.numbers)).max())
-    if not fit.converged or misfit(fit.normal) > diagnostics.GOOD or departure > diagnostics.STRANGE:
+    few = len(fit_log) < FEW_KEPT * len(log)
+    if few or not fit.converged or misfit(fit.normal) > diagnostics.GOOD or departure > diagnostics.STRANGE:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
     elif Omission.OTHER_EQUILIBRIUM in lost:
         elsewhere = lost[Omission.OTHER_EQUILIBRIUM]
@@ -124,6 +154,17 @@ def calibrate(
     validation = cross_validate(problem, fit, kept, folds, robust=robust, progress=progress) if folds else None
     omitted = {**left_out, **{reason: locked(rows[which]) for reason, which in lost.items()}}
     return calibration_of(problem, asked, fit, kept, rows, omitted, log.source, validation)
+
+
+def _without_inertia(log: WinchLog, moving: Flags) -> WinchLog:
+    """Log without the load cells of moving rows, which also read inertia forces; rejects a log without such rows."""
+    step = "Log the times and the measured positions of slow motions, or leave clock_offset out."
+    if log.time is None:
+        raise InvalidValueError("log: time", "not given", "times for clock_offset", step)
+    if not moving.any():
+        value, allowed = "without a moving row that has a measured pose", "at least one for clock_offset"
+        raise InvalidValueError("log", value, allowed, step)
+    return log if log.load_cells is None else log.replace(load_cells=np.where(moving[:, None], np.nan, log.load_cells))
 
 
 def active_sensors(log: WinchLog) -> Sensors:
@@ -141,16 +182,80 @@ def active_sensors(log: WinchLog) -> Sensors:
 
 
 def _check_model(robot: Robot, model: CableModel) -> None:
-    if model.code not in (codes.CATENARY, codes.ELASTIC):
-        step = "Use Catenary()."
-        raise InvalidValueError("model", type(model).__name__, "Catenary() or Elastic(), which are exact", step)
+    if model.code not in (codes.CATENARY, codes.ELASTIC, codes.STRAIGHT):
+        step = "Use Catenary(), or Straight() for a fit of the geometry alone."
+        raise InvalidValueError("model", type(model).__name__, "Catenary(), Elastic() or Straight()", step)
+    refuse_slanted(robot)
     if robot.winches is not None and robot.winches.guides is not None:
         step = "Give dead_cable, the whole guided length, instead of guides."
         raise InvalidValueError("winches: guides", "given", "None for calibrate", step)
 
 
+def _geometric_start(
+    problem: FitProblem, log: WinchLog, rows: Indices, unknowns: Sequence[Unknown]
+) -> SearchState | None:
+    """Initial state from a calibration with straight cables, for a log without load cells; None if it fails.
+
+    Without load cells, noise of the lengths makes cables slack at the reported lengths, and the search would end at one
+    of several minima.
+    """
+    asked = [one for one in unknowns if one.name not in OF_FORCES]
+    try:
+        found = calibrate(problem.robot, log, asked, model=Straight(), folds=0)
+        at = dict(zip(found.parameters.labels, internal(found.parameters, found.values), strict=True))
+        numbers = np.array([at.get(*pair) for pair in zip(problem.parameters.labels, problem.prior, strict=True)])
+        machine = problem.machine_at(numbers)
+    except InvalidValueError:
+        return None
+    if not np.isin(rows, found.rows).all():
+        return None
+    poses = pose_rows(found.poses)[np.searchsorted(found.rows, rows)]
+    reported = problem.reported_lengths(machine)
+    return SearchState(numbers, machine, held_lengths(problem, machine, poses, reported, balanced=True), poses.copy())
+
+
+def _with_assumed_rotations(
+    robot: Robot, model: CableModel, log: WinchLog, fit_log: WinchLog, unknowns: Sequence[str | Unknown]
+) -> tuple[WinchLog, WinchLog]:
+    """The logs, with rotations as commanded, or level, if neither lengths nor positions determine the rotations."""
+    asked = checked_unknowns(unknowns, log.sensors, straight=True)
+    parameters = parameters_of(robot, _with_relative_lengths(log, asked), log.sensors, counted=log.counts is not None)
+    problem = FitProblem(robot, model, log.sensors, parameters, readings_table(fit_log))
+    state = start_of(problem, fit_log.commanded)
+    readings = problem.readings(problem.reported_lengths(state.machine), slice(None))
+    if "measuring_frame" in parameters.names or rotation_error(state.machine, readings, state.poses) < LEVEL:
+        return log, fit_log
+    return _with_rotations(log), _with_rotations(fit_log)
+
+
+def _with_rotations(log: WinchLog) -> WinchLog:
+    """The log with the rotations of the commanded poses, or level ones, in place of measured rotations."""
+    turned = log.sensors.frame.rotation.inv()
+    if log.commanded is not None:
+        turned = turned * log.commanded.rotation
+    deviation = LEVEL if log.sensors.rotation_deviation is None else log.sensors.rotation_deviation
+    sensors = log.sensors.replace(rotation_deviation=deviation)
+    source = f"{log.source} (rotations assumed within {n(LEVEL, '.2g', 'rad')})".strip()
+    return log.replace(rotation=np.broadcast_to(turned.as_quat(), (len(log), 4)), sensors=sensors, source=source)
+
+
+def _with_relative_lengths(log: WinchLog, unknowns: list[Unknown]) -> list[Unknown]:
+    """The unknowns; length zeros without a stated prior have no prior if a length of the log is zero or negative."""
+    if log.unstrained_length is None or not (log.unstrained_length <= 0.0).any():
+        return unknowns
+    if "length_zero" not in (one.name for one in unknowns):
+        row, cable = (int(k) for k in np.argwhere(log.unstrained_length <= 0.0)[0])
+        value = f"{log.unstrained_length[row, cable]:.6g} m, relative to an unknown zero"
+        step = "Add length_zero to the unknowns, or give the whole lengths."
+        raise InvalidValueError(f"log: length[{row}, {cable}]", value, "> 0 m, or the unknown length_zero", step)
+    if log.commanded is None and log.position is None:
+        step = "Add commanded poses x_commanded, ..., or measured positions x, y, z."
+        raise InvalidValueError("log", "relative lengths alone", "commanded or measured positions beside them", step)
+    return [replace(one, deviation=one.deviation or np.inf) if one.name == "length_zero" else one for one in unknowns]
+
+
 def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters: Parameters, model: CableModel) -> None:
-    """Reject a log with a likely mistake. Reject measured poses that do not fit, if all other readings fit."""
+    """Reject a log with a likely mistake, and measured poses that disagree with all other readings."""
     if not {"measuring_frame", "target"}.isdisjoint(parameters.names):
         log = log.replace(position=None, rotation=None)  # the axes of the measuring system are not known yet
     _refuse(diagnostics.diagnose_log(robot, log, model))
@@ -159,7 +264,7 @@ def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters:
 
 
 def _refuse(sentences: Iterable[str]) -> None:
-    """Reject a log if there is a sentence about a mistake; the message is the first sentence."""
+    """Raise an error about a mistake in a log, with the first of `sentences`; without sentences, do nothing."""
     for sentence in sentences:
         what, _, step = sentence.partition("; " if "; " in sentence else ": ")
         step = f"{step[:1].upper()}{step[1:]}."
@@ -167,10 +272,15 @@ def _refuse(sentences: Iterable[str]) -> None:
         raise InvalidValueError("log", value, allowed, step)
 
 
-def _check_count(log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices], *, freely: bool) -> None:
-    """Reject a log with fewer readings than unknowns; gains and biases count only if the caller chose them freely."""
+def _check_count(
+    log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices], more: int, *, freely: bool
+) -> None:
+    """Reject a log with fewer readings than unknowns; gains and biases of load cells count only with `freely`.
+
+    more: number of lengths minus number of motions of the poses, for straight cables.
+    """
     wanted = len([name for name in parameters.names if freely or name not in OF_CELLS])
-    readings = reading_count(log)
+    readings = reading_count(log) + more
     if readings >= wanted:
         return
     gone = "".join(f"; {counted(len(rows), 'row')} left out: {reason.text}" for reason, rows in left_out.items())

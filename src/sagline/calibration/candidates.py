@@ -20,18 +20,18 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.methods import MinimumNorm, QuadraticProgram
 
 MOST_SETS: Final = 5  # number of sets of tensions at one pose
-ROUNDS: Final = 6  # largest number of attempts to draw poses; a large part of a box may be infeasible
-KEPT: Final = 0.02  # margin at both tension limits, as a share of their range; actual tensions differ from commands
-GROUP: Final = 20  # number of poses per solution; their sets of tensions are near the same corners
-UNLIMITED: Final = 3.0  # replacement of an infinite upper limit, relative to the largest minimum-norm tension
-SAME: Final = 1e-6  # smallest distance of two sets of tensions, as a share of the largest tension
+ROUNDS: Final = 6  # largest number of draws of random poses; a box with many infeasible poses needs more than one
+KEPT: Final = 0.02  # margin at both tension limits, as a share of their range; actual and planned tensions differ
+GROUP: Final = 20  # number of poses with the same random target corners of the tension range
+UNLIMITED: Final = 3.0  # multiple of the largest minimum-norm tension that replaces an infinite tension limit
+SAME: Final = 1e-6  # two sets of tensions are equal if they differ by less than this share of the largest tension
 
 
 class CandidatePoses(NamedTuple):
-    """N equilibria."""
+    """Candidates for calibration poses: N equilibria, each with a pose, lengths and tensions."""
 
     poses: Array  # pose rows, shape (N, POSE_COLUMNS)
-    lengths: Array  # all cable off the drums [m], shape (N, m)
+    lengths: Array  # unstrained lengths off the drums [m], shape (N, m)
     tensions: Array  # tensions at the frame ends [N], shape (N, m)
     place: Indices  # index of the pose, shape (N,); all sets of tensions at one pose have the same index
     usual: Flags  # True if the pose belongs to the uniform distribution over the box, shape (N,)
@@ -44,10 +44,10 @@ class CandidatePoses(NamedTuple):
 def candidates_of(
     robot: Robot, model: CableModel, box: PoseBox, count: int, seed: int, progress: Progress | None = None
 ) -> CandidatePoses:
-    """Feasible poses of a box, at most `count`, each with several sets of tensions near corners of the feasible set.
+    """At most `count` feasible poses of `box`, each with several sets of tensions near corners of the tension range.
 
-    Every second pose is uniformly distributed in the box. The other poses are nearer to the faces of the box and to the
-    largest tilt, because readings are most informative there. Raises an error with the reason if no pose is feasible.
+    Half of the poses are uniformly distributed in the box. Half of the poses are nearer to the faces of the box and to
+    the largest tilt, where readings are most informative. Raises an error with the reason if no pose is feasible.
     """
     rng = np.random.default_rng(seed)
     sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
@@ -74,7 +74,7 @@ def _concatenated(parts: list[CandidatePoses]) -> CandidatePoses:
 
 
 def _random_poses(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> Pose:
-    """Random poses of a box; the second pose, the fourth pose and so on are nearer to the borders."""
+    """Random poses of a box: in turn a pose of a uniform distribution, and a pose that tends to be near the borders."""
     share, part = rng.uniform(size=(count, 3)), rng.uniform(size=count)
     share[1::2] = 0.5 - 0.5 * np.cos(np.pi * share[1::2])
     part[1::2] **= 0.25
@@ -91,7 +91,7 @@ def _random_poses(robot: Robot, box: PoseBox, count: int, rng: np.random.Generat
 
 
 def _with_margins(robot: Robot, model: CableModel, poses: Pose, kept: float) -> Robot:
-    """Robot with finite tension limits and a margin at both ends of the range between them."""
+    """Robot with finite tension limits, which leave a margin: the share `kept` of the original range at each end."""
     low, high = robot.tension_min, robot.tension_max
     if np.isinf(high).any():
         least = np.nan_to_num(_solve(robot, model, poses[:GROUP], MinimumNorm())[2])
@@ -103,7 +103,7 @@ def _with_margins(robot: Robot, model: CableModel, poses: Pose, kept: float) -> 
 def _feasible(
     robot: Robot, model: CableModel, poses: Pose, sets: int, rng: np.random.Generator, progress: Progress | None
 ) -> tuple[CandidatePoses, Codes]:
-    """Feasible candidates among poses with sets of tensions, and the solution status of each pose."""
+    """Feasible combinations of a pose and a set of tensions, and the solution status of all combinations."""
     found, statuses = [], []
     for part in blocks(len(poses), GROUP, progress):
         corners = np.where(rng.uniform(size=(sets, robot.cable_count)) < 0.5, robot.tension_min, robot.tension_max)
@@ -126,21 +126,21 @@ def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) 
     """Status, lengths and frame-end tensions of each pose."""
     try:
         plan = inverse(robot, poses, model, method)
-    except CableGeometryError:  # at this pose, a platform anchor is at a frame anchor or inside a pulley
+    except CableGeometryError:  # one of the poses has a platform anchor at a frame anchor or inside a pulley
         missing = np.full((len(poses), robot.cable_count), np.nan)
         return np.full(len(poses), PoseStatus.NO_CHORD, dtype=np.int8), missing, missing
     return plan.status, plan.unstrained_length, plan.state.cables.frame_end_tension
 
 
 def _different(tensions: Array) -> Flags:
-    """Flags (N, sets): True for a set of tensions (N, sets, m) that differs from all previous sets at the same pose."""
+    """True (N, sets) for each set of `tensions` (N, sets, m) that is not equal to a previous set at the same pose."""
     apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
     same = apart <= SAME * np.nanmax(tensions, initial=0.0)
     return np.asarray(~np.tril(same, -1).any(axis=-1))
 
 
 def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
-    """True where lengths and tensions (..., m) are within the cable on the winches and the range of the load cells."""
+    """True where the winches have enough cable for `lengths` (..., m) and the load cells can measure `tensions`."""
     winches = robot.winches
     fits = np.ones(lengths.shape, dtype=np.bool_)
     if winches is not None and winches.cable_length is not None:
@@ -152,7 +152,7 @@ def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
 
 
 def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
-    """Error of a box without a feasible pose, with the most frequent reason."""
+    """Error for a box without a feasible pose. The message names the most frequent reason."""
     codes, counts = np.unique(statuses, return_counts=True)
     reason = PoseStatus(int(codes[np.argmax(counts)]))
     beyond = "the winches do not have enough cable, or the tensions are outside the range of the load cells"
@@ -164,13 +164,13 @@ def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
 
 
 PASSES: Final = 50  # passes over all pairs of edges; a tour of a hundred places takes fewer than ten
-_ROUNDING: Final = 1e-9  # smallest improvement, relative to the largest distance
+_ROUNDING: Final = 1e-9  # smaller improvements of a tour, relative to the largest distance, are rounding errors
 
 
 def shortest_tour(places: Array) -> Indices:
     """Order (N,) of places (N, d) on a short open tour that visits each place once (2-opt, Croes 1958)."""
     count = len(places)
-    apart = np.zeros((count + 1, count + 1))  # the last place is virtual, at distance zero from all
+    apart = np.zeros((count + 1, count + 1))  # the last place is virtual, so that the tour is open
     apart[:count, :count] = np.linalg.norm(places[:, None] - places[None], axis=-1)
     order = np.concatenate(([count], _nearest_neighbor_tour(apart[:count, :count]), [count]))
     for _ in range(PASSES):
@@ -197,7 +197,7 @@ def _nearest_neighbor_tour(apart: Array) -> Indices:
 
 
 def _reverse_segments(order: Indices, apart: Array, floor: float) -> bool:
-    """Reverse every segment if this shortens the tour, in place; True if a segment was reversed."""
+    """Reverse each segment of `order` in place if this shortens the tour; True if a segment was reversed."""
     changed = False
     for i in range(len(order) - 2):
         before, first, lasts, after = order[i], order[i + 1], order[i + 1 : -1], order[i + 2 :]

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.calibration.hypotheses import CELL_UNITS, LENGTH_UNITS, Hypothesis, Trial
-from sagline.calibration.log import WinchLog, load_cells_of
+from sagline.calibration.log import WinchLog, load_cells_of, measures_yaw
 from sagline.calibration.screening import screen
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices
@@ -20,29 +20,29 @@ from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
-UNIT: Final = 50.0  # ratio of a reading to its expected value above which its unit is wrong; between 1 and 1000
-GOOD: Final = 5.0  # largest sum of squares per reading for a good fit; slips and rope errors raise it above 1
-POOR: Final = 50.0  # a larger limit than GOOD; it applies if a correction reduces the sum to a hundredth or less
-# largest mean square of the departures from the priors, in prior deviations. If the anchors are wrong by 0.25 m, a fit
-# with swapped cables may agree with the readings by chance
+UNIT: Final = 50.0  # a reading that exceeds its expected value by this factor has a wrong unit, such as mm for m
+GOOD: Final = 5.0  # largest sum of squares per reading of a good fit; it exceeds 1 because of slips and rope errors
+POOR: Final = 50.0  # used as GOOD for a corrected mistake that reduces the sum of squares to at most a hundredth
+# A fit is accepted only if the mean square of (value - prior) / prior deviation is smaller. A fit with swapped cables
+# may otherwise agree with the readings by chance, with anchors that are wrong by 0.25 m.
 NEAR: Final = 0.25
-STRANGE: Final = 6.0  # prior deviations: a value that departs by more suggests a mistake in the log, although it fits
-# smallest ratio of the robot's size to the deviation of lengths or positions; below it, they are not informative
+STRANGE: Final = 6.0  # prior deviations: largest departure of a fitted value that does not suggest a mistake in the log
+# Lengths or positions are informative only if the robot is larger than this multiple of their standard deviation.
 ROUGH: Final = 10.0
-FAR: Final = 0.25  # smallest reported error of a zero, relative to the length; tape measures have smaller errors
-SHIFTS: Final = 5  # largest tested shift of the load cells in time, in rows
-_FULLY: Final = 3  # number of fits to convergence, for the most promising changes
+FAR: Final = 0.25  # smallest error of a length zero, relative to the length, that is reported as a mistake
+SHIFTS: Final = 5  # largest tested time shift between load cells and lengths, in rows
+_FULLY: Final = 3  # number of the most promising changes that are fitted until convergence
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENARY) -> tuple[str, ...]:
     """Likely mistakes in a log, as sentences with the next step; empty for a consistent log.
 
-    The first check compares the readings with their expected sizes. It detects lengths and positions in mm, and load
-    cells in kN. Then a robot similar to the given robot is fitted to about 24 rows. If no such robot fits, corrections
-    of single mistakes are tested: columns of two cables exchanged (encoders, load cells or both), an encoder that
-    counts backward, zeros with large errors, load cells or lengths up to five rows early or late, or units (kgf, lbf,
-    ft, in). The first correction that gives a fit is reported. Zeros with large errors, lengths with the wrong sign,
-    and lengths that are early or late, are found only with commanded poses.
+    A comparison of the readings with their expected sizes detects lengths and positions in mm, and load cells in kN.
+    Then a robot similar to the given robot is fitted to about 24 rows. If no similar robot fits, the function tests
+    corrections of single mistakes. These mistakes are exchanged columns of two cables (encoders, load cells or both),
+    an encoder that counts backward, zeros with large errors, load cells or lengths up to five rows early or late, and
+    wrong units (kgf, lbf, ft, in). The first correction with a good fit is reported as the mistake. Zeros with large
+    errors, lengths with the wrong sign, and lengths that are early or late, are found only with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -56,7 +56,7 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
 
 
 def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
-    """Sentences about readings that seem to have another unit, judged by their size in all rows of the log."""
+    """Sentences about readings that seem to have a wrong unit, because their size in all rows is unusual."""
     frame, platform = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (robot.frame_anchors, robot.platform_anchors))
     size = frame + platform + (0.0 if robot.winches is None else float(robot.winches.dead_cable.max()))
     across, step = f"and the robot is {size:.3g} m across", "divide them by 1000, or write their unit"
@@ -79,8 +79,8 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
     share = robot.mass * robot.gravity / robot.cable_count
     if typical * UNIT < share:
         yield (
-            f"load cells seem to be in kN: the largest of a row reads about {typical:.3g} N, and a cable's share of "
-            f"the weight is {share:.3g} N; multiply them by 1000, or write their unit, load_cell_0 [kN]"
+            f"load cells seem to be in kN: the largest reading of a row is about {typical:.3g} N, and a cable's share "
+            f"of the weight is {share:.3g} N; multiply them by 1000, or write their unit, load_cell_0 [kN]"
         )
     elif typical > UNIT * max(share, float(np.median(robot.cables.axial_stiffness)) / UNIT):
         yield (
@@ -90,7 +90,7 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
 
 
 def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) -> bool:
-    """True if a robot similar to this robot fits lengths and load cells, without the measured poses."""
+    """True if a robot similar to `robot` fits the lengths and load cells, when the measured poses are ignored."""
     if log.load_cells is None or (log.position is None and log.rotation is None):
         return False
     own = log.replace(position=None, rotation=None)
@@ -120,7 +120,7 @@ def _spread(position: Array) -> float:
 
 
 def _single_mistake(trial: Trial) -> Iterator[str]:
-    """Sentence about a single mistake; its correction gives a fit."""
+    """Sentence about a single mistake that explains the misfit of the log; no sentence if no mistake explains it."""
     before, departure, zeros = trial.result(Hypothesis())
     far = _far(trial, zeros)
     if before <= GOOD:
@@ -144,7 +144,7 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
 
 
 def _other_unit(trial: Trial, departure: float) -> Iterator[str]:
-    """Sentence about another unit of load cells with a smaller departure of the fit from the priors."""
+    """Sentence about a wrong unit of the load cells, if another unit brings the fitted values nearer to the priors."""
     for unit in CELL_UNITS:
         quality, nearer, _ = trial.result(Hypothesis(cell_unit=unit))
         if unit and quality <= GOOD and nearer < min(NEAR, 0.5 * departure):
@@ -153,7 +153,7 @@ def _other_unit(trial: Trial, departure: float) -> Iterator[str]:
 
 
 def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
-    """Possible mistakes in lengths or counts; some of them include an exchange of the load cells of the same cables."""
+    """Possible mistakes in lengths or counts, such as two swapped cables with or without swapped load cells."""
     m = trial.robot.cable_count
     if trial.log.counts is None:
         yield from (Hypothesis(length_unit=unit) for unit in LENGTH_UNITS if unit)
@@ -186,7 +186,7 @@ def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
 
 
 def _usual(trial: Trial) -> Array:
-    """Typical lengths of the cables [m]: distances between the anchors, because lengths depend on the zeros."""
+    """Typical lengths (m,) of the cables [m]: distances of the frame anchors from the center of the poses."""
     commanded = trial.log.commanded
     middle = trial.robot.frame_anchors.mean(axis=0) if commanded is None else np.median(commanded.position, axis=0)
     return np.asarray(np.linalg.norm(trial.robot.frame_anchors - middle, axis=1))
@@ -197,7 +197,7 @@ def _far(trial: Trial, zeros: Array) -> Flags:
 
 
 def _zero_text(zeros: Array, far: Flags) -> str:
-    """Text of the cables with large errors of their zeros."""
+    """Text that lists the cables with a large error of the length zero."""
     cables = np.flatnonzero(far).tolist()
     listed = ", ".join(
         f"{abs(zeros[i]):.2f} m too {'short' if zeros[i] > 0.0 else 'long'} on cable {i}" for i in cables
@@ -234,17 +234,17 @@ def _change_text(change: Hypothesis, log: WinchLog) -> str:
 
 
 def _misfit_text(quality: float) -> str:
-    """Text of a quality in standard deviations."""
+    """Text of the misfit in standard deviations, which is the square root of `quality`."""
     return f"{np.sqrt(quality):.3g} standard deviations" if np.isfinite(quality) else "without bound"
 
 
-FEWEST: Final = 4  # number of measured points that show a reflection
-CLEARLY: Final = 0.2  # largest ratio of the distances after and before an explanation
-FLAT: Final = 0.05  # points are coplanar if their extent along an axis is a smaller share of the largest extent
+FEWEST: Final = 4  # smallest number of measured points that can show a reflection
+CLEARLY: Final = 0.2  # a motion explains the distances between points if it reduces them to less than this share
+FLAT: Final = 0.05  # points are coplanar if their extent along an axis is below this share of the largest extent
 
 
 def _aligned(there: Array, measured: Array, *, reflected: bool) -> tuple[Array, float]:
-    """Rotation (3, 3) of measured points (N, 3) onto others, and the root mean square distance [m] (Kabsch 1976)."""
+    """Rotation (3, 3) that aligns `measured` (N, 3) with `there`, and the root mean square distance [m] (Kabsch)."""
     first, other = there - there.mean(axis=0), measured - measured.mean(axis=0)
     left, _, right = np.linalg.svd(first.T @ other)
     sign = np.sign(np.linalg.det(left @ right)) * (-1.0 if reflected else 1.0)
@@ -253,7 +253,7 @@ def _aligned(there: Array, measured: Array, *, reflected: bool) -> tuple[Array, 
 
 
 def _left_handed(there: Array, measured: Array) -> str | None:
-    """Sentence about left-handed axes, if only a reflection maps the measured points (N, 3) to the expected ones."""
+    """Sentence about left-handed axes, if only a reflection maps `measured` (N, 3) to the expected points `there`."""
     if len(there) < FEWEST or (extent := _extents(there))[2] < FLAT * extent[0]:
         return None
     (_, plain), (matrix, mirrored) = (_aligned(there, measured, reflected=reflected) for reflected in (False, True))
@@ -263,13 +263,14 @@ def _left_handed(there: Array, measured: Array) -> str | None:
     axes = [axis for axis, sign in zip("xyz", signs, strict=True) if sign < 0.0]
     which = f"column {axes[0]}" if len(axes) == 1 and np.abs(signs).min() > 0.9 else "one column, or exchange two"
     return (
-        f"the axes of the measured positions seem to be left-handed: with a reflection they agree to "
-        f"{n(mirrored, '.2g', 'm')}, without to {n(plain, '.2g', 'm')}; change the sign of {which}"
+        f"the axes of the measured positions seem to be left-handed: they agree "
+        f"within {n(mirrored, '.2g', 'm')} with a reflection, within {n(plain, '.2g', 'm')} without; change "
+        f"the sign of {which}"
     )
 
 
 def _other_axes(there: Array, measured: Array) -> str | None:
-    """Text of the motion that explains the measured points (N, 3); None if no motion explains them."""
+    """Text about a rigid motion that maps `measured` (N, 3) to the expected points `there`; None if none fits."""
     if len(there) < 3 or _extents(there)[1] < FLAT * _extents(there)[0]:
         return None
     before = float(np.sqrt(np.mean(np.sum((there - measured) ** 2, axis=1))))
@@ -277,7 +278,7 @@ def _other_axes(there: Array, measured: Array) -> str | None:
     if after > CLEARLY * before:
         return None
     turn = n(np.degrees(Rotation.from_matrix(matrix).magnitude()), ".2g", "°")
-    return f"by {n(before, '.2g', 'm')}, in other axes (turned by {turn}) by {n(after, '.2g', 'm')}"
+    return f"by {n(before, '.2g', 'm')}, but only by {n(after, '.2g', 'm')} in axes that are turned by {turn}"
 
 
 def _extents(points: Array) -> Array:
@@ -299,6 +300,9 @@ def _frame_mismatch(
     lost, count = int(np.count_nonzero(measured[left_out])), int(np.count_nonzero(measured))
     if 2 * lost <= count:
         return None
+    if log.position is None and not measures_yaw(log.sensors):
+        what = f"{lost} of {count} measured inclinations disagree with the lengths"
+        return f"{what}; check the signs and the order of beta (pitch) and gamma (roll), or leave them out"
     what = f"{lost} of {count} measured poses disagree with the lengths"
     unknowns = [name for name in ("measuring_frame", "target") if name not in asked and (log.position is not None)]
     more = " and ".join(unknowns or ["measuring_frame"] * ("measuring_frame" not in asked))

@@ -1,4 +1,4 @@
-"""The result of a search: covariance, criticism of the parameters that were not estimated, status and provenance."""
+"""Result of a calibration: covariance, status, provenance, and test of the parameters that were not estimated."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtr, chdtrc
 
 from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Omission
@@ -26,13 +27,13 @@ from sagline.robot.pose import Pose
 from sagline.robot.tolerances import Provenance
 from sagline.robot.winch import Winch
 
-# smallest probability of such a chi squared by chance; with a smaller probability, the result is doubtful
+# A result is doubtful if the probability that chance alone gives such a large chi squared is below this value.
 DOUBTFUL: Final = 1e-4
-ODD: Final = 0.1  # largest share of poses that fit badly; above it the whole result is doubtful
-ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
+ODD: Final = 0.1  # the whole result is doubtful if a larger share of the poses fits badly
+ODD_WEIGHT: Final = 0.5  # a pose fits badly if its weight is below this value
 TOLERATED: Final = 1.1  # largest accepted ratio of chi squared to its expected value, because no model is exact
-HARMLESS: Final = 1.0  # standard errors: a criticism with smaller changes of all values does not make a result doubtful
-LITTLE: Final = 1e-6  # smallest component of an unobservable direction for a parameter to count as unobservable
+HARMLESS: Final = 1.0  # standard errors: largest change of a value by contradicted parameters that is not doubtful
+LITTLE: Final = 1e-6  # largest component of an observable parameter in an unobservable direction
 CHANCE: Final = 0.01  # probability that a log without errors fails a score test
 
 
@@ -46,7 +47,7 @@ def calibration_of(
     source: str,
     validation: CrossValidation | None,
 ) -> Calibration:
-    """Calibration from a fit to the poses `kept` (N,); rows: their rows of the log, (N,); left_out: omitted rows."""
+    """Calibration from a fit to the poses `kept`; rows: row of each pose in the log; left_out: omitted rows."""
     parameters, numbers, machine, normal = problem.parameters, fit.state.numbers, fit.state.machine, fit.normal
     wider, count = _with_fixed_parameters(problem, unknowns), len(numbers)
     residuals, factor = _last_readings(problem, wider, fit)
@@ -95,7 +96,7 @@ def calibration_of(
 
 
 def _status(fit: Fit, kept: Flags, result: Calibration) -> CalibrationStatus:
-    """Status of a fit, from the poses of full weight, from all poses without outliers, and from the criticisms."""
+    """Status of a fit, from chi squared, the share of poses that fit badly, and the criticisms of `result`."""
     if not fit.converged:
         return CalibrationStatus.NOT_CONVERGED
     weights, elsewhere = fit.normal.weights, len(result.left_out.get(Omission.OTHER_EQUILIBRIUM, ()))
@@ -111,7 +112,7 @@ def _status(fit: Fit, kept: Flags, result: Calibration) -> CalibrationStatus:
 
 
 def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:
-    """Covariance of the values (P, P) and its rank; infinite on the diagonal without observations and prior."""
+    """Covariance (P, P) of the values, and its rank; the variance of an unobserved value without prior is infinite."""
     scale = problem.scale
     _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, problem.prior_root * scale))
     observable = sizes > OPEN * sizes[0]
@@ -123,11 +124,11 @@ def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[
     return covariance, int(np.count_nonzero(observable))
 
 
-def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bool) -> bool:
+def _is_doubtful(chi_squared: float, free: int, readings: NDArray[np.integer], *, robust: bool) -> bool:
     """True if the residuals are too large or too small for the deviations of the sensors.
 
-    Poses that fit badly are not counted. This lowers the expected sum of squares of the other poses: it is the mean of
-    a chi squared distribution truncated at a quantile c, r F(c; r + 2)/F(c; r).
+    Poses that fit badly are not counted. The expected sum of squares of a counted pose with r readings is therefore the
+    mean of a chi squared distribution that is truncated at c: r F(c; r + 2)/F(c; r).
     """
     if free <= 0:
         return False
@@ -142,20 +143,20 @@ def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bo
 def provenance_of(
     parameters: Parameters, standard_error: Array, status: CalibrationStatus, log: str, date: str
 ) -> Provenance:
-    """Provenance of the values of a calibrated robot, each with its standard error (P,); date in ISO 8601."""
+    """Provenance of a calibrated robot with log, date (ISO 8601) and the standard errors (P,) of the values."""
     note = "" if status is CalibrationStatus.FOUND else status.text
     return Provenance(log, date, quantities_of(parameters, standard_error), note)
 
 
 def _with_fixed_parameters(problem: FitProblem, unknowns: Sequence[Unknown]) -> FitProblem:
-    """Problem with all observable parameters; the parameters that were not estimated are the last ones.
+    """Problem with all observable parameters: first the estimated parameters, then the fixed parameters.
 
-    These are the kinds that the robot has and the readings observe, with one value per cable.
+    The fixed parameters are all kinds that the robot has and the readings observe, with one value per cable.
     """
     robot = problem.robot if problem.robot.winches is not None else problem.robot.replace(winches=Winch())
     every, sensors, counted = list(unknowns), problem.sensors, problem.parameters.counted
     for name, kind in KINDS.items():
-        if name in problem.parameters.names:
+        if name in problem.parameters.names or (kind.needs == "motion" and problem.log.motion is None):
             continue
         other = Unknown(name, shared=False if kind.each else None)
         try:
@@ -168,10 +169,10 @@ def _with_fixed_parameters(problem: FitProblem, unknowns: Sequence[Unknown]) -> 
 
 
 def _last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Array, Array]:
-    """Residuals and triangular factor at the end of a fit; wider: problem with fixed parameters.
+    """Residuals and triangular factor at the end of a fit; wider: problem that also has the F fixed parameters.
 
-    The residuals have the shape (N, 2 m + 6) [m, N, m, rad]; they are NaN if missing. The columns of the factor are the
-    weighted whitened slopes by all P + F parameters, and the misfit: (at most P + F + 1, P + F + 1).
+    The residuals have the shape (N, 2 m + 6) [m, N, m, rad]; a missing residual is NaN. The factor has at most P + F +
+    1 rows, one column for each of the P + F parameters, and a column for the misfit.
     """
     fitted = fit.state
     machine = with_parameters(fitted.machine, wider.parameters)
@@ -190,13 +191,13 @@ def _last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Ar
 def _criticism(
     problem: FitProblem, wider: FitProblem, fit: Fit, triangle: Array, covariance: Array
 ) -> tuple[Array, tuple[Criticism, ...]]:
-    """Covariance (P, P) due to the stated tolerances of fixed parameters (Schmidt), and the contradicted parameters.
+    """Covariance (P, P) due to tolerances of fixed parameters (Schmidt); fixed parameters that readings contradict.
 
-    The readings contradict fixed parameters if their estimation would reduce chi squared more than by chance. The test
-    is the score test with the priors of the fixed parameters. A kind is tested with a value for each cable, and with a
-    common value. Kinds of load cells are also tested for single cables. The test with the best information criterion
-    (AIC) is kept. The largest reduction comes first. triangle: factor of `_last_readings`; covariance: of the estimated
-    parameters.
+    The readings contradict a fixed parameter if chi squared would fall significantly when it is estimated.
+    The test is the score test with the priors of the fixed parameters. Each kind of parameter is tested with one value
+    per cable and with one common value. Gains and biases of load cells are also tested for single cables. For each
+    kind, the test with the best information criterion (AIC) is reported. The largest reduction comes first. triangle:
+    factor of `_last_readings`; covariance: covariance of the estimated parameters.
     """
     count, parameters = len(problem.parameters.names), wider.parameters
     priors = np.zeros((count, triangle.shape[1]))
@@ -206,9 +207,9 @@ def _criticism(
     left, sizes, right = np.linalg.svd(whole[:, :count] * scale, full_matrices=False)
     seen = sizes > OPEN * sizes[0]
     left, known_part = left[:, seen], left[:, seen].T @ whole[:, count:]
-    rest = whole[:, count:] - left @ known_part  # without the part that a step of the estimated parameters reproduces
+    rest = whole[:, count:] - left @ known_part  # effects that no change of the estimated parameters reproduces
     steps = scale[:, None] * (right[seen].T / sizes[seen] @ known_part[:, :-1])
-    shifts = -fit.state.machine.slopes[:, None] * steps  # change of the P values by the internal fixed parameters
+    shifts = -fit.state.machine.slopes[:, None] * steps  # derivatives of the P values by the fixed parameters
     stated, deviation = np.flatnonzero(parameters.stated[count:]), wider.prior_deviation[count:]
     effect = shifts[:, stated] * deviation[stated]
     considered = np.asarray(effect @ effect.T)
@@ -231,13 +232,13 @@ def _criticism(
 
 
 def _groups(parameters: Parameters, first: int) -> Iterator[tuple[str, str, Indices, bool]]:
-    """Kind, name and indices of each group of fixed parameters; True if they have one value."""
+    """Kind, name and indices of each tested group of fixed parameters; True if the group has one common value."""
     names, cables = np.array(parameters.names[first:]), parameters.cables[first:]
     for name in dict.fromkeys(names.tolist()):
         which = np.flatnonzero(names == name)
         yield name, name, which, False
         if KINDS[name].each and len(KINDS[name].axes) == 1:
             yield name, f"{name} common to all cables", which, True
-        if name in OF_CELLS:  # also tested for single cables
+        if name in OF_CELLS:  # gains and biases are also tested for single cables
             for k in which:
                 yield name, f"{name}[{cables[k]}]", np.array([k]), False

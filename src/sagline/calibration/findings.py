@@ -1,4 +1,4 @@
-"""Findings of a calibration as data, and the standard deviations of the sensors from its residuals.
+"""Findings of a calibration as data, and standard deviations of the sensors from the residuals.
 
 The deviations are variance components by REML; see docs/model.md, section 14.
 """
@@ -13,11 +13,14 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors, reading_deviations
-from sagline.calibration.observations import unwhitened_slopes
-from sagline.calibration.parameters import Parameters, internal, prior_root, prior_units, slopes_of_values
+from sagline.calibration.observations import machine_of, unwhitened_slopes, winch_slopes
+from sagline.calibration.parameters import Parameters, internal, prior_root, prior_units, slopes_of_values, values_in
+from sagline.calibration.straight import whitened_errors
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.indices import evenly_spaced
 from sagline.core.results import Result, Status
+from sagline.kernels import codes
+from sagline.kernels.calibration import kinds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
@@ -39,7 +42,7 @@ class CalibrationStatus(Status):
 
 
 class Omission(Status):
-    """Reason for the omission of a row of a log; `text` describes it for one row."""
+    """Reason why a row of a log is omitted; `text` states the reason for one row."""
 
     NOT_A_NUMBER = 0, "a reading is missing"
     REPEATED = 1, "the readings repeat an earlier row"
@@ -56,8 +59,7 @@ class Direction(Result):
     Attributes:
         name: For example "the world shifted along x", or "pulley_radius with frame_anchors z".
         vector: Change of the parameters for one standard deviation of the combination, in their units, (P,).
-        known: Ratio of the standard deviation after the calibration to the prior one: 1 if the readings have no
-            information.
+        known: Standard deviation after the calibration divided by the prior standard deviation.
         step: Recommended measurement, for example "fix a frame anchor, or measure 3 points".
     """
 
@@ -88,16 +90,16 @@ class Outlier(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Criticism(Result):
-    """Fixed parameters that the readings contradict: their estimation would reduce chi squared more than by chance.
+    """Fixed parameters that the readings contradict, because their estimation would clearly reduce chi squared.
 
     Attributes:
         name: For example "load_cell_gain common to all cables", "load_cell_gain[3]" or "center_of_mass".
-        kind: Kind of unknown, which can be added to the unknowns.
+        kind: Name of the unknown to add, so that the calibration estimates the parameters.
         fall: Reduction of chi squared.
-        chance: Probability of such a reduction if the fixed values were correct.
-        moves: Label of the estimated parameter that would change most, in standard errors.
-        change: This change, in the unit of the parameter.
-        deviations: This change in standard errors, >= 0.
+        chance: Probability that chi squared falls by `fall` if the fixed values are correct.
+        moves: Label of the estimated parameter with the largest change in standard errors.
+        change: Change of the parameter `moves`, in its unit.
+        deviations: Absolute value of `change` in standard errors.
     """
 
     name: str
@@ -111,13 +113,13 @@ class Criticism(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorDeviation(Result):
-    """Standard deviation of a kind of sensor, or of the sensor of a cable, from the residuals of a calibration.
+    """Standard deviation of a kind of sensor, or of one cable's sensor, computed from the residuals of a calibration.
 
     Attributes:
         quantity: "length", "load cell", "position" or "rotation".
-        cable: Index of the cable, or None for all cables.
+        cable: Index of the cable, or None if all cables have the same standard deviation.
         stated: Standard deviation of `Sensors` [m, N or rad].
-        found: Standard deviation from the residuals; NaN if the readings do not determine it.
+        found: Standard deviation from the residuals; NaN if the readings do not determine a value.
         error: Standard error of `found`.
     """
 
@@ -134,11 +136,11 @@ class CrossValidation(Result):
 
     Attributes:
         folds: Number of parts of the poses.
-        tension: Root mean square of load cell readings minus predictions [N]; NaN without load cells.
-        position: Root mean square distance from measured positions [m]; NaN without a position measured along all three
-            axes.
-        tension_before: `tension` with the robot before the calibration [N].
-        position_before: `position` with the robot before the calibration [m]; NaN if the measuring system was unknown.
+        tension: Root mean square difference between load cell readings and predictions [N]; NaN without load cells.
+        position: Root mean square distance of measured and predicted positions [m]; NaN without complete positions.
+        tension_before: As `tension`, but predicted with the robot before the calibration [N].
+        position_before: As `position`, but predicted with the robot before the calibration [m]; NaN if the pose of the
+            measuring system was unknown.
     """
 
     folds: int
@@ -150,7 +152,7 @@ class CrossValidation(Result):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Findings(Result):
-    """Base of `Calibration` with the fields documented there."""
+    """Base class of `Calibration`, which documents the fields."""
 
     robot: Robot
     before: Robot
@@ -181,16 +183,16 @@ class Findings(Result):
 
     @property
     def chi_squared_of_all(self) -> tuple[float, int]:
-        """Chi squared of the readings of all poses without outliers, with any weight, and its expected value."""
+        """Chi squared of all poses without outliers, including poses with a reduced weight, and its expected value."""
         counted = ~np.isin(self.rows, [outlier.row for outlier in self.outliers])
-        change = counted.astype(np.int64) - (self.weights == 1.0)  # 1: added, -1: removed
+        change = counted.astype(np.int64) - (self.weights == 1.0)  # 1: pose is added, -1: pose is removed
         readings = np.count_nonzero(~np.isnan(self.residuals[:, self.robot.cable_count :]), axis=1)
         chi_squared = self.chi_squared + float(self.chi_squared_of_pose @ change)
         return chi_squared, self.degrees_of_freedom + int(readings @ change)
 
     @property
     def standard_error(self) -> Array:
-        """Standard deviations of the values, in their units, (P,); infinite if unobserved and without a prior."""
+        """Standard errors (P,) of the values in their units; infinite for an unobserved value without a prior."""
         return locked(np.sqrt(np.diagonal(self.covariance)))
 
     @property
@@ -205,20 +207,20 @@ class Findings(Result):
 
 
 QUANTITIES: Final = ("length", "load cell", "position", "rotation")
-FEWEST: Final = 10.0  # smallest redundancy of a group of readings for an estimate
-LARGEST: Final = 0.3  # largest relative standard error of an estimate
-GROSS: Final = 4.5  # smallest outlier, in estimated standard deviations
+FEWEST: Final = 10.0  # smallest redundancy of a group of readings for which there is an estimate
+LARGEST: Final = 0.3  # largest relative standard error of an estimate; otherwise there is no estimate
+GROSS: Final = 4.5  # standard deviations: a smaller error is not an outlier
 ROUNDS: Final = 4
-MOST: Final = 300  # largest number of poses; more poses reduce the standard errors only
+MOST: Final = 300  # largest number of poses for the estimate; more poses would only reduce its standard errors
 FLOOR: Final = 0.01  # smallest ratio of a variance to its stated value
 ITERATIONS: Final = 20
-TOLERANCE: Final = 0.01  # relative change of a variance
+TOLERANCE: Final = 0.01  # the iteration ends if no variance changes by more, relative to its value
 
 
 def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[SensorDeviation, ...]:
-    """Standard deviation of each kind of sensor, or of the sensor of each cable, from the residuals.
+    """Standard deviation of each kind of sensor, or of each cable's sensor, computed from the residuals.
 
-    Poses with outliers are omitted at first. A pose is used again if its outlier is small in the estimated deviations.
+    The first estimate omits poses with outliers. Later estimates include poses with small outliers.
     """
     m = found.robot.cable_count
     stated, ratios = reading_deviations(found.sensors, m), dict.fromkeys(QUANTITIES, 0.0)
@@ -238,7 +240,7 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
         ratios |= {quantity: float(np.sqrt(factor)) for (quantity, *_), factor in zip(groups, factors, strict=True)}
     deviations = []
     for (quantity, cable, one), factor, error, number in zip(groups, factors, errors, redundancy, strict=True):
-        given = float(np.sqrt(np.mean(stated[one] ** 2)))
+        given = float(np.sqrt(np.mean(stated[one][np.isfinite(stated[one])] ** 2)))
         known = number > FEWEST and error < LARGEST and factor > FLOOR
         now = given * float(np.sqrt(factor)) if known else np.nan
         deviations.append(SensorDeviation(quantity, cable, given, now, now * float(error)))
@@ -257,46 +259,52 @@ def _groups(m: int, *, per_cable: bool) -> list[tuple[str, int | None, Indices]]
 
 
 def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Array, Array, Array, Array]:
-    """Whitened slopes (n, R, P), noise (n, R, 2 m + 6), misfit at the priors (n, R), and root of the prior (P, P)."""
+    """Whitened slopes (n, R, P), effects of errors (n, R, 2 m + 6), misfit (n, R) and root of the prior (P, P)."""
     m, parameters = found.robot.cable_count, found.parameters
     lengths = np.atleast_2d(found.unstrained_length)[used]
+    scale = prior_units(parameters).scale
+    step = (internal(parameters, found.values) - internal(parameters, parameters.prior)) / scale
+    deviation = parameters.prior_deviation / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
+    root = prior_root(parameters) * (scale / deviation)
+    root *= np.sqrt(len(used) / len(found.rows))  # the prior information per pose is the same as in the whole log
+    if found.model.code == codes.STRAIGHT:
+        numbers = found.length_offset, values_in(parameters, found.values, kinds.SCALE, 1.0)
+        machine = machine_of(found.robot, found.model, parameters, found.sensors, *numbers)
+        slopes = winch_slopes(machine, lengths)
+        rows, noise, misfit = whitened_errors(machine, slopes, pose_rows(found.poses)[used], found.residuals[used])
+        return rows * scale, noise, misfit + rows * scale @ step, root
     by_values, by_length = unwhitened_slopes(
         found.robot, found.model, parameters, found.sensors, pose_rows(found.poses)[used], lengths
     )
-    scale = prior_units(parameters).scale
     residuals = found.residuals[used]
     read = ~np.isnan(residuals[:, m:])
-    step = (internal(parameters, found.values) - internal(parameters, parameters.prior)) / scale
     slopes = by_values * slopes_of_values(found.robot, parameters) * scale * read[..., None]
     noise = np.concatenate((by_length, np.broadcast_to(np.eye(m + 6), (len(used), m + 6, m + 6))), axis=2)
     noise = noise * np.where(np.isfinite(stated), stated, 0.0) * read[..., None]
     misfit = np.where(read, residuals[:, m:] - np.einsum("nij,nj->ni", by_length, residuals[:, :m]), 0.0)
     whiten = np.linalg.inv(np.linalg.cholesky(noise @ np.swapaxes(noise, 1, 2) + _units(~read)))
-    deviation = parameters.prior_deviation / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
-    root = prior_root(parameters) * (scale / deviation)
     slopes, misfit = whiten @ slopes, np.einsum("nij,nj->ni", whiten, misfit)
-    root *= np.sqrt(len(used) / len(found.rows))  # as much prior information per pose as in the whole log
     return slopes, whiten @ noise, misfit + slopes @ step, root
 
 
 def _units(missing: Flags) -> Array:
-    """Unit variances of missing readings, (n, R, R)."""
+    """Covariance (n, R, R) with the variance 1 for missing readings and 0 for all other readings."""
     return np.asarray(missing[:, :, None] * np.eye(missing.shape[1]))
 
 
 def variance_factors(
     rows: Array, noise: Array, misfit: Array, root: Array, groups: Sequence[Indices]
 ) -> tuple[Array, Array, Array]:
-    """Ratios of the variances of groups of errors to the stated ones, by restricted maximum likelihood.
+    """Estimated variances divided by stated variances, for groups of errors, by restricted maximum likelihood.
 
     The ratios are at least `FLOOR`. The method is Fisher scoring (Förstner 1979).
 
     Args:
-        rows: Slopes of N poses by the parameters, (N, R, P), for readings with unit covariance.
-        noise: Effects of the errors, each with a standard deviation of 1 if the stated deviations are right, (N, R, E).
+        rows: Derivatives of the whitened readings of N poses by the parameters, (N, R, P).
+        noise: Effects (N, R, E) of E errors on the whitened readings; the errors have the stated variance 1.
         misfit: Readings minus predictions at the priors, (N, R).
         root: Root of the prior information, (P, P).
-        groups: Errors of each group, G of them.
+        groups: Indices of the errors of each of G groups.
 
     Returns:
         Ratios (G,), relative standard errors of the deviations (G,), and redundancy numbers (G,).
@@ -321,9 +329,9 @@ def variance_factors(
 
 
 def _information(own: list[Array], z: Array, covariance: Array) -> tuple[Array, Array]:
-    """Traces of P U_g, (G,), and of P U_g P U_h, (G, G).
+    """Traces of P U_g, shape (G,), and traces of P U_g P U_h, shape (G, G), for groups g and h of errors.
 
-    P: projection on fit residuals for whitened slopes z; U: covariance of the readings by each group of errors.
+    P: projection of the readings on the residuals of a fit with slopes `z`; U_g: covariance that group g causes.
     """
     along = [np.swapaxes(part, 1, 2) @ z for part in own]
     steps = [each @ covariance for each in along]

@@ -1,4 +1,4 @@
-"""Hypotheses about mistakes in a log that fits no similar robot. Each hypothesis is tested on some of the rows."""
+"""Hypotheses about mistakes in a log that no robot similar to the given robot fits, and tests on some of its rows."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-MOST_ROWS: Final = 24  # number of rows for the tests of changes, for three load cell readings per unknown
-STEPS: Final = 12  # least-squares iterations; if a robot fits, half of them are sufficient
-TOLERANCE: Final = 1.0  # relative tolerance of the sum of squares; a few percent are sufficient for a decision
-FEWEST_ROWS: Final = 8  # number of rows if the log has no commanded poses
-# Prior deviations: larger than usual, because any similar robot may fit. If a logarithm is estimated, the deviation is
-# a share of the value.
+MOST_ROWS: Final = 24  # number of rows for the test of a hypothesis: about three load cell readings per unknown
+STEPS: Final = 12  # largest number of least-squares iterations; a log without mistakes needs half of them
+TOLERANCE: Final = 1.0  # the fit stops if the predicted decrease of the sum of squares is below this value
+FEWEST_ROWS: Final = 8  # number of rows for the test of a hypothesis if the log has no commanded poses
+# Prior deviations. They are larger than usual, so that any similar robot may fit. They are relative to the value where
+# its logarithm is estimated.
 _WIDE: Final = {
     "frame_anchors": 0.3,
     "platform_anchors": 0.05,
@@ -42,7 +42,7 @@ LENGTH_UNITS: Final = {"": 1.0, "ft": 0.3048, "in": 0.0254}  # [m]
 
 
 class Hypothesis(NamedTuple):
-    """A change of the readings."""
+    """Hypothesis about a mistake: a change that would correct the readings of a log."""
 
     lengths: tuple[int, int] | None = None  # two cables with exchanged lengths or counts, or None
     cells: tuple[int, int] | None = None  # two cables with exchanged load cells, or None
@@ -56,14 +56,14 @@ class Hypothesis(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """Tests of possible changes of a log.
+    """Tests of hypotheses about mistakes in a log.
 
     Attributes:
         robot: The robot before the calibration.
         model: Cable model.
         log: The whole log.
-        rows: Indices of the rows that are fitted.
-        found: Poses by forward kinematics, for each change of the lengths and number of rows.
+        rows: Indices of the rows that the tests may use.
+        found: Poses by forward kinematics for each tested change of the lengths and each number of rows.
     """
 
     robot: Robot
@@ -75,14 +75,14 @@ class Trial:
     def result(self, change: Hypothesis) -> tuple[float, float, Array]:
         """Fit of a similar robot to the changed readings: quality, departure, and errors of the zeros [m], (m,).
 
-        The quality is the median over the rows of the sum of squares per reading: 1 if a robot fits within the
-        deviations of the sensors, infinite if none fits. The departure is the mean square of the distance of the
+        The quality is the sum of squares per reading, as a median over the rows: about 1 if a robot fits within the
+        deviations of the sensors, infinite if no robot fits. The departure is the mean square of the distance of the
         parameters from their priors, in prior deviations.
         """
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
-        except (ValueError, np.linalg.LinAlgError):  # the search diverges with such readings
+        except (ValueError, np.linalg.LinAlgError):  # the search diverges if the readings are inconsistent
             return np.inf, np.inf, moved
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
@@ -107,18 +107,18 @@ class Trial:
         return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
 
     def most_promising(self, changes: Iterable[Hypothesis], steps: int, most: int) -> list[Hypothesis]:
-        """At most `most` changes with a smaller predicted misfit than the unchanged log, best first."""
+        """At most `most` of the `changes` with a smaller predicted misfit than the unchanged log, best first."""
         promises = {change: self.promise(change, steps) for change in changes}
         limit = self.promise(Hypothesis(), steps)
         return sorted((change for change in promises if promises[change] < limit), key=promises.__getitem__)[:most]
 
     def offsets(self) -> tuple[Array, Array]:
-        """Median of lengths minus lengths at the commanded poses, and the median deviation from it [m], both (m,)."""
+        """Differences between reported and commanded lengths [m]: median and median absolute deviation, both (m,)."""
         problem, poses, _ = self._problem(Hypothesis(), MOST_ROWS)
         return _offsets(problem, poses)
 
     def measured_points(self) -> tuple[Array, Array]:
-        """Positions of the target at the commanded poses, or by the lengths, and measured positions, (N, 3) [m]."""
+        """Positions (N, 3) of the target [m] according to commanded poses or lengths, and measured positions (N, 3)."""
         problem, poses, _ = self._problem(Hypothesis(), MOST_ROWS)
         sensors, measured = self.log.sensors, problem.log.positions
         if poses is None:
@@ -127,9 +127,9 @@ class Trial:
         return poses.position + turned, sensors.frame.position + measured @ sensors.frame.matrix.T
 
     def _problem(self, change: Hypothesis, most: int) -> tuple[FitProblem, Pose | None, Array]:
-        """Least-squares problem for some rows, their commanded poses, and the shifts of the zeros [m]."""
+        """Least-squares problem for at most `most` rows, the initial poses of the rows, and shifts of the zeros [m]."""
         log, late, m = self.log, change.late, self.robot.cable_count
-        read_at = self.rows + late + change.behind  # one of them is zero
+        read_at = self.rows + late + change.behind  # either `late` or `behind` is zero
         rows = self.rows[(read_at >= 0) & (read_at < len(log))]
         rows = rows[evenly_spaced(len(rows), most)]
         given = readings_table(log.rows(rows))
@@ -156,7 +156,7 @@ class Trial:
         return problem, poses, moved
 
     def _poses(self, problem: FitProblem, change: Hypothesis, most: int) -> Pose | None:
-        """Poses by forward kinematics of the lengths; None if a pose is not solved."""
+        """Poses by forward kinematics of the lengths; None if the forward kinematics of any row fails."""
         key = change._replace(cells=None, cell_unit=""), most
         if key not in self.found:
             rows = start_of(problem, None).poses
@@ -172,7 +172,7 @@ class Trial:
         return name != "linear_density" or bool((self.robot.cables.linear_density > 0.0).all())
 
     def _counts_of_length(self) -> Array:
-        """Counts per meter of cable paid out, (m,), for the lowest layer of each drum."""
+        """Encoder counts (m,) per meter of cable that leaves the lowest layer of each drum [1/m]."""
         drums = drums_of(self.robot)
         rate = drums.zero_and_rate()[1]
         _, travel = drums.turns(drums.starts[:, :1].T)
@@ -180,7 +180,7 @@ class Trial:
 
 
 def _fitted(problem: FitProblem, state: SearchState) -> Evaluated:
-    """State after a few least-squares steps; if a robot fits, half of them are sufficient."""
+    """State after at most `STEPS` least-squares steps, and the normal equations at this state."""
     begun = evaluate_step(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
     fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, tolerance=TOLERANCE)
     return fit.state, fit.normal

@@ -1,7 +1,7 @@
-"""Unobservable directions of the parameters: combinations that change no reading, each with its name.
+"""Unobservable directions: combinations of parameters that change no reading, each with its name.
 
-Some of them are symmetries. The origins of the world and of the platform frame, the meter and the newton are
-conventions. Another convention changes parameters, but no reading. See docs/model.md, section 14.
+Some unobservable directions are symmetries. For example, a shift of the origin of the world frame changes parameters,
+but no reading, because the origin is a convention. See docs/model.md, section 14.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from sagline.kernels.calibration import kinds
 from sagline.robot.drum import drums_of
 from sagline.robot.robot import Robot
 
-OPEN: Final = 1e-12  # rounding error of slopes that cancel, relative to the largest singular value
-_SPREAD: Final = 1e-9  # a direction with a larger singular value, relative to the largest, is always observable
-_SAME: Final = 1e-6  # two directions count as equal below this sine of the angle between them
+OPEN: Final = 1e-12  # rounding error of a singular value that is exactly zero, relative to the largest singular value
+_SPREAD: Final = 1e-9  # a direction is always observable if its singular value exceeds this share of the largest
+_SAME: Final = 1e-6  # largest sine of the angle between two directions that count as equal
 _TINY: Final = 1e-300
-_NAMED: Final = 3  # number of parameters in the text of a direction that is not a symmetry
+_NAMED: Final = 3  # largest number of parameters that the text of a direction names, if it is not a symmetry
 
 
 def append_rows(triangle: Array, matrix: Array) -> Array:
-    """Triangular factor (at most P, P) of the previous factor and additional rows (..., P), without rows with NaN.
+    """Triangular factor (at most P, P) of the rows of `triangle` and `matrix` (..., P); rows with NaN are omitted.
 
-    Householder reflections keep all digits of small singular values; normal equations would lose half of them.
+    Householder reflections keep all digits of small singular values; normal equations would lose half of the digits.
     """
     rows = matrix.reshape(-1, matrix.shape[-1])
     rows = rows[~np.isnan(rows).any(axis=1) & rows.any(axis=1)]
@@ -38,7 +38,7 @@ def append_rows(triangle: Array, matrix: Array) -> Array:
 
 
 def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
-    """Unit vectors, in standard deviations of the priors, that change no reading, as columns (P, d)."""
+    """Unit vectors that change no reading, in standard deviations of the priors, as columns (P, d)."""
     vectors = np.zeros((len(frame.scale), 0))
     if not frame.free.size:
         return vectors
@@ -51,7 +51,7 @@ def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
 
 
 def numerical_rank(values: Array) -> int:
-    """Number of singular values (descending) before the widest gap near `OPEN`; smaller ones are rounding errors."""
+    """Number of singular values before the widest gap near `OPEN`; later values are only rounding errors."""
     largest = values[0] if values.size else 0.0
     if largest == 0.0:
         return 0
@@ -67,7 +67,7 @@ def numerical_rank(values: Array) -> int:
 def gauge_of(
     triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
 ) -> tuple[Direction, ...]:
-    """Unobservable directions of the unknowns, with names; only the priors determine the values along them."""
+    """Unobservable directions of the unknowns, with names; only the priors determine values along these directions."""
     frame = prior_units(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
@@ -76,7 +76,7 @@ def gauge_of(
     frame = frame._replace(free=np.setdiff1d(frame.free, alone))
     left = _open_directions(triangle, frame)
     where = parameters.where[_TURN, 0]
-    turn = np.where(where >= 0, values[where], 0.0)  # rotation of the measuring system [rad]; zero if it is known
+    turn = np.where(where >= 0, values[where], 0.0)  # rotation vector of the measuring system [rad]; zero if known
     each, table, lengths, matters = symmetries(robot, sensors, turn, counted=parameters.counted)
     matters &= ~np.isin(parameters.where, alone)
     admissible = _admissible_symmetries(frame, parameters.where, table, lengths, matters)
@@ -99,13 +99,13 @@ def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direct
 def _symmetric_part(
     left: Array, vectors: Array, shares: Array, each: Sequence[Generator]
 ) -> tuple[Array, list[tuple[str, str]]]:
-    """Admissible symmetries within the span of the unobservable directions (P, d), with names and steps."""
+    """Admissible symmetries in the span of the unobservable directions `left` (P, d), with names and measurements."""
     shares = shares[: len(each)]
     if not vectors.shape[1] or not left.shape[1]:
         return left[:, :0], []
     basis, upper = np.linalg.qr(vectors)
     _, sines, turned = np.linalg.svd(basis - left @ (left.T @ basis), full_matrices=False)
-    inside = np.linalg.solve(upper, turned[sines < _SAME].T)  # directions that are symmetries and unobservable
+    inside = np.linalg.solve(upper, turned[sines < _SAME].T)  # symmetries that are also unobservable
     mixed = _echelon((shares @ inside).T).T
     found = vectors @ np.linalg.lstsq(shares, mixed, rcond=None)[0]
     return found, [_named(column, each) for column in mixed.T]
@@ -114,10 +114,10 @@ def _symmetric_part(
 def _admissible_symmetries(
     frame: PriorUnits, where: Indices, table: Array, lengths: Array, matters: Flags
 ) -> tuple[Array, Array]:
-    """Combinations of symmetries that change only unknowns: vectors (P, k), and coefficients of the symmetries (g, k).
+    """Combinations of g symmetries that change only unknowns, as vectors (P, k) and as coefficients (g, k).
 
-    Both are in standard deviations. Known values do not change, and values that all cables share change equally. Zeros
-    and radii of the drums change so that the drums pay out the required lengths.
+    Vectors and coefficients are in standard deviations. Known values stay constant, and values that all cables share
+    change equally. Length zeros and drum radii change so that the drums pay out the required lengths.
     """
     free = np.isin(where, frame.free)
     conditions = [table[matters & ~free], lengths]
@@ -143,7 +143,7 @@ def _null(matrix: Array) -> Array:
 
 
 def _echelon(rows: Array) -> Array:
-    """Reduced row echelon form: a sparse basis of the span of the rows."""
+    """Reduced row echelon form: a basis of the span of `rows` with many zeros."""
     rows = rows.copy()
     lead = 0
     for column in range(rows.shape[1]):
@@ -161,7 +161,7 @@ def _echelon(rows: Array) -> Array:
 
 
 def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
-    """Name and step of a combination of symmetries: step of the first symmetry, names without later shifts."""
+    """Name of a combination of symmetries, and the measurement that fixes the first of the symmetries."""
     size = np.abs(shares)
     taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
     first = taken[0]
@@ -170,7 +170,7 @@ def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
 
 
 def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:
-    """Name, vector and step of a direction, from the parameters that it changes most."""
+    """Name, vector and recommended measurement of a direction; the name lists the parameters that change most."""
     size = np.abs(vector)
     order = np.argsort(-size, kind="stable")
     moved = [int(index) for index in order if size[index] > 1e-3 * size.max()]
@@ -180,7 +180,7 @@ def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:
     return name, vector, easiest_measurement(parameters.names[index] for index in moved)
 
 
-STEPS: Final = {  # the easiest measurement first
+STEPS: Final = {  # kind of parameter: measurement of the kind; easy measurements come first
     "pulley_radius": "measure the pulley with a caliper",
     "mass": "weigh the platform",
     "linear_density": "weigh some meters of the cable",
@@ -191,6 +191,8 @@ STEPS: Final = {  # the easiest measurement first
     "axial_stiffness": "choose poses with very different tensions, or measure the stretch of a piece of the cable",
     "center_of_mass": "balance the platform, or choose poses with more tilt",
     "platform_anchors": "measure the platform's anchors",
+    "length_scale": "pay out a length along a tape",
+    "clock_offset": "move faster",
     "length_zero": "home at a pose that is measured",
     "target": "measure the target on the platform, or choose poses with more tilt",
     "measuring_frame": "measure more poses, some of them rotated",
@@ -199,12 +201,12 @@ STEPS: Final = {  # the easiest measurement first
 
 
 def measurement_rank(name: str) -> int:
-    """Rank of a kind of parameter; easier measurements come first."""
+    """Rank of a kind of parameter by the effort of its measurement; 0 for the easiest measurement."""
     return list(STEPS).index(name)
 
 
 def easiest_measurement(names: Iterable[str]) -> str:
-    """Easiest measurement that separates parameters of some kinds."""
+    """Easiest measurement that distinguishes the parameters of the kinds `names`."""
     return STEPS[min(names, key=measurement_rank)]
 
 
@@ -224,17 +226,17 @@ _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
 class Generator(NamedTuple):
-    """A change of the parameters that changes no reading, if all parameters are unknowns."""
+    """Symmetry: a change of all parameters together that changes no reading."""
 
     name: str  # name of the quantity
     step: str  # measurement that fixes the quantity
-    # change of every row of `kernels.calibration.kinds`, (KIND_ROWS, m); relative where the logarithm is estimated
+    # changes of the parameters, as rows of `kernels.calibration.kinds` (KIND_ROWS, m); of logarithms where estimated
     change: Array
     lengths: float = 0.0  # relative change of the lengths off the drums
 
 
 def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generator]:
-    """Symmetries with a name; turn: rotation vector of the measuring system [rad], (3,)."""
+    """Symmetries that have a name; turn: rotation vector (3,) of the measuring system [rad]."""
     m, winches, center, place = robot.cable_count, robot.winches, robot.center_of_mass, sensors.frame.position
 
     def generator(name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0) -> Generator:
@@ -243,7 +245,7 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
             change[rows] = values
         return Generator(name, step, change, lengths)
 
-    # the cables become lighter per meter, so that forces do not change
+    # the linear density decreases, so that forces do not change
     scaled: list[tuple[Any, Array | float]] = [(_FRAME, robot.frame_anchors.T), (_PLATFORM, robot.platform_anchors.T)]
     scaled += [(kinds.DENSITY, -1.0)]
     if winches is not None:
@@ -257,7 +259,7 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
     moved = [(_FRAME, np.cross(up, robot.frame_anchors).T), (_SHIFT, np.cross(up, place)[:, None])]
     turned = np.linalg.solve(left_jacobian(turn), up)[:, None]
     yield generator("the world turned about the vertical", _YAW, *moved, (_TURN, turned))
-    for axis, unit in zip("xyz", np.eye(3), strict=True):  # about the center of mass
+    for axis, unit in zip("xyz", np.eye(3), strict=True):  # rotations and shifts about the center of mass
         anchors, target = np.cross(unit, robot.platform_anchors - center).T, np.cross(unit, sensors.target - center)
         changes = ((_PLATFORM, anchors), (_TARGET, target[:, None]))
         yield generator(f"the platform's frame turned about its {axis}", _TILT, *changes)
@@ -277,44 +279,44 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
 def symmetries(
     robot: Robot, sensors: Sensors, turn: Array, *, counted: bool
 ) -> tuple[tuple[Generator, ...], Array, Array, Flags]:
-    """Symmetries of a robot and its sensors, including changes of the zeros and radii of its drums.
+    """Symmetries of a robot and its sensors, including changes of length zeros, drum radii and length scales.
 
-    turn: rotation vector of the measuring system [rad], (3,). Returns the symmetries with a name (the columns of the
-    drums follow after these); the change of every row of `kinds`, (KIND_ROWS, m, g); the lengths that the drums pay out
-    minus required lengths, (2 m, g), which a combination must make zero; and True for parameters that a symmetry must
-    not change if they are known, (KIND_ROWS, m).
+    The argument `turn` is the rotation vector (3,) of the measuring system [rad]. Returns the symmetries with a name,
+    and three arrays. Array 1, (KIND_ROWS, m, g), is the change of each row of `kinds` by each of g symmetries. Array 2,
+    (2 m, g), is the length that the drums pay out minus the required length, zero for admissible combinations. Array 3,
+    (KIND_ROWS, m), is True for parameters that are constant if known.
     """
     m, each = robot.cable_count, tuple(_generators(robot, sensors, turn))
-    drums = np.zeros((kinds.KIND_ROWS, m, 2 * m))
-    drums[kinds.ZERO, np.arange(m), np.arange(m)] = 1.0
-    drums[kinds.DRUM, np.arange(m), m + np.arange(m)] = 1.0
+    drums = np.zeros((kinds.KIND_ROWS, m, 3 * m))
+    for k, row in enumerate((kinds.ZERO, kinds.DRUM, kinds.SCALE)):
+        drums[row, np.arange(m), k * m + np.arange(m)] = 1.0
     table = np.concatenate((np.stack([one.change for one in each], axis=-1), drums), axis=-1)
-    asked = np.concatenate(([one.lengths for one in each], np.zeros(2 * m)))
+    asked = np.concatenate(([one.lengths for one in each], np.zeros(3 * m)))
     shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
-    matters[kinds.PER_CABLE :, 1:] = False
-    # measuring system and target may change, because a few measured points do not determine them
-    matters[kinds.SHIFT :] = False
+    matters[kinds.PER_CABLE : kinds.SCALE, 1:] = False
+    # The pose of the measuring system and the target may change: a few measured points do not determine them.
+    matters[kinds.SHIFT : kinds.SCALE] = False
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False
-    if not robot.freedom[:, 3:].any():  # without rotations, the center of mass has no effect
+    if not robot.freedom[:, 3:].any():  # a platform that cannot rotate: the center of mass has no effect
         matters[_CENTER] = False
     return each, table, np.concatenate((shift, share - asked)), matters
 
 
 def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
-    """Derivatives a + b L of the length L off each drum, by each row of `kinds`: a [m] and b, (KIND_ROWS, m)."""
+    """Derivatives a + b L of the lengths L off the drums by the rows of `kinds`: a [m] and b, each (KIND_ROWS, m)."""
     shift, share = np.zeros((2, kinds.KIND_ROWS, robot.cable_count))
     if not counted:
-        shift[kinds.ZERO] = 1.0
+        shift[kinds.ZERO] = share[kinds.SCALE] = 1.0
         return shift, share
     drums = drums_of(robot)
     stretch, zero = 1.0 + drums.rest_strain, drums.winches.length_zero
     radius, diameter, pitch = drums.winches.drum_radius, robot.cables.diameter, drums.winches.groove_pitch
-    if zero is None or radius is None or diameter is None or pitch is None:  # counts need these data
+    if zero is None or radius is None or diameter is None or pitch is None:  # counts give no lengths without these data
         raise InvalidValueError("robot", "without counts", "with drums and their zeros", "Give them in the robot file.")
     circle = (2.0 * np.pi * (radius + 0.5 * diameter)) ** 2
-    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # by the log of the radius
+    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # by the logarithm
     shift[kinds.ZERO] = 1.0 / stretch
     shift[kinds.DRUM], share[kinds.DRUM] = -by_radius * zero / stretch, by_radius
     share[kinds.STIFFNESS] = drums.rest_strain / stretch

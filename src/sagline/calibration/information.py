@@ -1,4 +1,4 @@
-"""Information about the parameters from poses, D-optimal choice of poses, and recommended measurements."""
+"""Fisher information of poses about the parameters, D-optimal choice of poses, and recommended measurements."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
-FEW: Final = 8  # largest number of readings per parameter for exchanges; with more, they reduce errors by less than 1 %
-OPEN: Final = 1e-12  # a direction with a smaller singular value, relative to the largest, is unobservable
-ROUNDING: Final = 1e-6  # a parameter with a smaller share of the square of a direction does not belong to the direction
-CONDITION: Final = 1e-13  # smallest prior relative to the information of all candidates; rounding hides a smaller prior
-_WORTH: Final = 1e-9  # smallest increase of the log det by an exchange; smaller ones are rounding
+FEW: Final = 8  # readings per parameter; with more readings, exchanges of poses would reduce errors by less than 1 %
+OPEN: Final = 1e-12  # a direction is unobservable if its singular value is below this share of the largest
+ROUNDING: Final = 1e-6  # smallest squared component, in a unit vector, of a parameter that belongs to a direction
+CONDITION: Final = 1e-13  # smallest prior information, relative to all candidates, that exceeds rounding errors
+_WORTH: Final = 1e-9  # smallest increase of the log det by an exchange; smaller increases may be rounding errors
 
 
 class Information:
-    """Information about P parameters from the chosen ones of N candidates, each with k whitened rows.
+    """Information about P parameters that the readings of chosen candidates contain.
 
     Attributes:
-        rows: Derivatives of the readings with respect to the internal parameters, shape (N, k, P).
-        covariance: Covariance of the parameters from the prior and the chosen candidates, shape (P, P).
-        chosen: Chosen candidates, in order.
+        rows: Derivatives of the whitened readings by the internal parameters, shape (N, k, P).
+        covariance: Covariance of the parameters with the prior and the readings of the chosen candidates, shape (P, P).
+        chosen: Indices of the chosen candidates, in the order of choice.
     """
 
     def __init__(self, rows: Array, known: Array) -> None:
-        """Start with no chosen candidate; known: inverse of the prior covariance (P, P)."""
+        """Begin without a chosen candidate; known: inverse (P, P) of the prior covariance."""
         self.rows = rows
         self.chosen: list[int] = []
         self._known = known
@@ -41,13 +41,13 @@ class Information:
         self.covariance, self._heard = self._recompute()
 
     def gains(self) -> Array:
-        """Increase of the log det of the information by each candidate, shape (N,); -1 for chosen ones."""
+        """Increase (N,) of the log det of the information that each candidate would cause; -1 for chosen candidates."""
         gains: Array = np.linalg.slogdet(self._unit + self._heard)[1]
         gains[self.chosen] = -1.0
         return gains
 
     def best(self) -> tuple[int, float]:
-        """The most informative candidate that is not chosen yet, and its increase of the log det."""
+        """The most informative candidate that is not chosen yet, and the increase of the log det that it causes."""
         gains = self.gains()
         best = int(np.argmax(gains))
         return best, float(gains[best])
@@ -63,29 +63,29 @@ class Information:
         self.chosen.append(candidate)
 
     def leave(self, candidate: int) -> None:
-        """Remove a candidate. The sum is computed again, because a subtraction would have large rounding errors."""
+        """Remove a candidate and sum the information again; a subtraction would cause large rounding errors."""
         self.chosen.remove(candidate)
         self.covariance, self._heard = self._recompute()
 
     def _recompute(self) -> tuple[Array, Array]:
-        """Covariance, and J C J^T of each candidate, from the chosen candidates."""
+        """Covariance C with the chosen candidates, and the product J C J^T for each of all candidates."""
         root = np.linalg.inv(np.linalg.cholesky(self._known + information_of(self.rows[self.chosen])))
         shares = self.rows @ root.T
         return root.T @ root, shares @ shares.transpose(0, 2, 1)
 
 
 def prior_information(rows: Array, root: Array) -> Array:
-    """Prior information (P, P) in units of the priors: R^T R, or the rounding error of the rows if it is larger."""
+    """Prior information R^T R (P, P) in units of the priors, scaled up if rounding errors of `rows` would exceed it."""
     return np.asarray(root.T @ root * max(1.0, CONDITION * float((rows**2).sum())))
 
 
 def choose_informative(rows: Array, known: Array, count: int) -> tuple[Indices, Array, Array]:
-    """D-optimal choice of `count` candidates: a greedy choice, and for few candidates an improvement by exchanges.
+    """D-optimal choice of `count` candidates by a greedy algorithm; exchanges improve a choice of few candidates.
 
-    Returns the indices of the candidates in the order of a greedy choice among them; and, for the first k of them, the
-    increase of the log det of the information, (count,), and the standard deviations of the parameters, (count, P).
+    Returns the indices of the chosen candidates, the most informative candidate first. Also returns the
+    increase of the log det (count,) and the deviations (count, P); row k - 1 is for the first k candidates.
 
-    The increase of log det by the greedy choice is at least 1 - 1/e of the largest possible increase, because log det
+    The greedy algorithm reaches at least 1 - 1/e of the largest possible increase of the log det, because the log det
     is submodular (Nemhauser, Wolsey & Fisher 1978). The exchanges follow Fedorov 1972.
     """
     found = Information(rows, known)
@@ -104,7 +104,7 @@ def choose_informative(rows: Array, known: Array, count: int) -> tuple[Indices, 
 
 
 def _exchange(found: Information) -> None:
-    """Replace each chosen candidate once by the best candidate that is not chosen."""
+    """Replace each chosen candidate by the best candidate that is not chosen, if this increases the log det."""
     for candidate in tuple(found.chosen):
         found.leave(candidate)
         gains = found.gains()
@@ -113,7 +113,7 @@ def _exchange(found: Information) -> None:
 
 
 def deviations_of(rows: Array, held: Array, root: Array) -> Array:
-    """Standard deviations (P,); infinite if unobserved.
+    """Standard deviations (P,) of the parameters; infinite for unobserved parameters.
 
     rows: whitened slopes; held: inverse prior deviations (P,); root: `prior_root` (P, P).
     """
@@ -127,19 +127,19 @@ def deviations_of(rows: Array, held: Array, root: Array) -> Array:
 
 
 def information_of(rows: Array) -> Array:
-    """Information J^T J (P, P) of whitened slopes (..., P)."""
+    """Fisher information J^T J (P, P) of whitened slopes `rows` (..., P)."""
     flat = rows.reshape(-1, rows.shape[-1])
     return np.asarray(flat.T @ flat)
 
 
-TOTAL_STATION: Final = 1e-3  # standard deviation of each coordinate [m]
+TOTAL_STATION: Final = 1e-3  # [m], standard deviation of each coordinate that a total station measures
 CELL_SHARE: Final = 0.01  # standard deviation of a typical load cell, relative to the median tension
-NEARLY: Final = 0.9  # a cheaper measurement is recommended with this share of the largest decrease of the log errors
-WORTH: Final = 0.99  # largest remaining share of the errors for a recommendation
+NEARLY: Final = 0.9  # a cheaper measurement is preferred if it has this share of the largest decrease of log errors
+WORTH: Final = 0.99  # a measurement is recommended only if it multiplies the errors by a smaller factor
 
 
-# for each kind: name of the measurement, its standard deviation in the unit of the kind, True if the deviation is a
-# share of the value
+# For each kind of parameter: text of the measurement; standard deviation of the measurement, in the unit of the kind or
+# relative to the value; True if relative.
 TOOLS: Final[dict[str, tuple[str, float, bool]]] = {
     "mass": ("weighing the platform to 0.1 %", 1e-3, True),
     "linear_density": ("weighing a length of the cable to 1 %", 0.01, True),
@@ -149,21 +149,21 @@ TOOLS: Final[dict[str, tuple[str, float, bool]]] = {
     "load_cell_gain": ("a known weight on each load cell, to 0.5 %", 5e-3, True),
     "load_cell_bias": ("reading each load cell without load, to 1 N", 1.0, False),
 }
-Option = tuple[str, Array]  # text of a measurement, and the information with it, shape (P, P)
+Option = tuple[str, Array]  # text of an additional measurement, and the information (P, P) after it
 
 
 class Situation(NamedTuple):
-    """Information about the parameters after the measurements at the chosen poses."""
+    """Calibration poses and the information about the parameters from measurements at these poses."""
 
     robot: Robot
     model: CableModel
     parameters: Parameters
     sensors: Sensors
-    scale: Array  # unit of each internal parameter for the information, shape (P,)
+    scale: Array  # unit of each internal parameter, shape (P,)
     slopes: Array  # derivatives of the values with respect to the internal parameters, shape (P,)
-    known: Array  # prior information, with a small value where there is no prior, shape (P, P)
+    known: Array  # prior information, shape (P, P); small for a parameter without a prior
     standing: CandidatePoses  # the chosen poses
-    rows: Array  # whitened rows of their readings, in units of `scale`, shape (N, k, P)
+    rows: Array  # whitened slopes of the readings, in units of `scale`, shape (N, k, P)
 
     @property
     def information(self) -> Array:
@@ -171,18 +171,18 @@ class Situation(NamedTuple):
         return np.asarray(self.known + information_of(self.rows))
 
     def rows_by(self, sensors: Sensors) -> Array:
-        """Whitened rows of the poses with other sensors, in units of `scale`, shape (N, m + 6, P)."""
+        """Whitened slopes (N, m + 6, P) that the sensors `sensors` would have at the poses, in units of `scale`."""
         poses, lengths = self.standing.poses, self.standing.lengths
         found = predicted_rows(self.robot, self.model, self.parameters, sensors, poses, lengths)
         return np.asarray(found.matrix * self.scale)
 
 
 def most_helpful(situation: Situation) -> str:
-    """Sentence about the recommended measurement: the one that reduces the mean log error most."""
+    """Sentence that recommends the measurement with the largest reduction of the mean log error."""
     before = _deviations(situation.information)
     best: Option | None = None
     most = -np.log(WORTH)
-    for option in _options(situation):  # the cheapest option of each kind comes first
+    for option in _options(situation):  # cheap options come before expensive options
         fall = float(np.log(before / _deviations(option[1])).mean())
         if fall > most / (1.0 if best is None else NEARLY):
             best, most = option, fall
@@ -195,7 +195,7 @@ def most_helpful(situation: Situation) -> str:
 
 
 def _options(situation: Situation) -> Iterator[Option]:
-    """Possible measurements that the readings do not include yet."""
+    """Possible additional measurements, with the information after each measurement."""
     parameters, sensors = situation.parameters, situation.sensors
     for name, (words, deviation, is_share) in TOOLS.items():
         if name in parameters.names:
@@ -215,7 +215,7 @@ def _options(situation: Situation) -> Iterator[Option]:
 
 
 def _measured_anchors(situation: Situation) -> Iterator[Option]:
-    """Options: one or three measured frame anchors."""
+    """Options to measure one frame anchor or three frame anchors."""
     names, cables = np.array(situation.parameters.names), situation.parameters.cables
     m = situation.robot.cable_count
     rows = np.zeros((m, 3, len(names)))
@@ -226,7 +226,7 @@ def _measured_anchors(situation: Situation) -> Iterator[Option]:
 
 
 def _measured_positions(situation: Situation) -> Iterator[Option]:
-    """Options: the position measured at three or six of the poses."""
+    """Options to measure the position of the platform at three or six of the poses."""
     sensors = situation.sensors.replace(position_deviation=TOTAL_STATION)
     alone = situation.rows_by(sensors.replace(tension_deviation=None, rotation_deviation=None))
     words = dict.fromkeys((3, 6), "the position at poses {} measured")
@@ -236,10 +236,9 @@ def _measured_positions(situation: Situation) -> Iterator[Option]:
 def _best_subset(
     situation: Situation, rows: Array, beside: Array, words: dict[int, str], instead: Array | None = None
 ) -> Iterator[Option]:
-    """Most informative measurements, for each number of measurements in `words`.
+    """Most informative sets of measurements; the keys of `words` are the numbers of measurements in a set.
 
-    rows: whitened rows of each measurement alone; beside: rows to add for a measurement; instead: rows to remove for
-    it.
+    rows: whitened slopes of each measurement alone; beside: rows to add for a measurement; instead: rows to replace.
     """
     found = Information(rows, situation.information)
     for _ in range(min(max(words), len(rows))):
@@ -257,7 +256,7 @@ def _deviations(known: Array) -> Array:
 
 
 def _largest_reduction(situation: Situation, before: Array, after: Array) -> str:
-    """Text of the largest reduction of errors among the kinds."""
+    """Text about the kind of parameter with the largest reduction of errors."""
     names = np.array(situation.parameters.names)
     name = min(dict.fromkeys(names), key=lambda name: float(np.log(after / before)[names == name].mean()))
     mine = names == name
@@ -268,10 +267,10 @@ def _largest_reduction(situation: Situation, before: Array, after: Array) -> str
 
 
 def error_text(value: float, unit: str) -> str:
-    """Text of an error with two digits; lengths in millimeters."""
+    """Text of an error with two digits; an error in meters is written in millimeters."""
     return n(1e3 * value, ".2g", "mm") if unit == "m" else n(value, ".2g", unit)
 
 
 def typical_load_cell_deviation(tensions: Array) -> float:
-    """Standard deviation of commercial load cells for tensions (N, m) [N]."""
+    """Standard deviation [N] of commercial load cells that are suitable for the tensions (N, m)."""
     return float(f"{CELL_SHARE * float(np.median(tensions)):.1g}")

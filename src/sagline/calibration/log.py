@@ -1,4 +1,4 @@
-"""Logs of a robot's own readings, one row per pose at rest, and the accuracy of the sensors."""
+"""Logs of a robot's own readings, with one row per pose at rest, and standard deviations of the sensors."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 from attrs import evolve, field, fields, frozen
 from numpy.typing import ArrayLike
 
+from sagline.calibration import rest
 from sagline.core.arguments import choice, instance, optional, text
-from sagline.core.arrays import Array, Flags, Indices, checked, exactly, locked
+from sagline.core.arrays import Array, Flags, Indices, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.indices import part_of
@@ -30,12 +31,12 @@ def _default_if_none(sensors: Sensors | None) -> Sensors:
 
 
 class _Replaceable(Result):
-    """Base of input types with fields that can be replaced; pickled through the constructor."""
+    """Base class of input types: `replace` changes fields, and unpickling calls the constructor."""
 
     __slots__ = ()
 
     def replace(self, **changes: Any) -> Self:
-        """Copy with some fields changed, checked like a new object.
+        """Copy with some fields changed; the constructor checks the copy.
 
         Args:
             changes: Fields and their new values.
@@ -60,13 +61,15 @@ class Sensors(_Replaceable):
         position_deviation: Standard deviation of each coordinate of a measured position [m], > 0, shape () or (3,),
             along the axes of the measuring system; None if positions are not measured.
         rotation_deviation: Standard deviation of measured rotations about each axis [rad], > 0, shape () or (3,); None
-            if rotations are not measured.
-        frame: Pose of the measuring system in the world; None for the axes of the world. A point with measured
-            coordinates p has the world coordinates frame.position + frame.matrix p.
+            if rotations are not measured. If the third value is infinite, the yaw is not measured, as with an
+            inclinometer: roll and pitch refer to the vertical and the axes of the world, not to `frame`, and the yaw of
+            the rotations in a log has no effect.
+        frame: Pose of the measuring system in the world; None for the axes of the world. If p are the measured
+            coordinates of a point, its world coordinates are frame.position + frame.matrix p.
         target: The measured point of the platform, in the platform frame [m], shape (3,).
 
     Raises:
-        InvalidValueError: If a deviation is not positive, or a value is of the wrong kind or shape.
+        InvalidValueError: If a standard deviation is not positive, or a value has the wrong type or shape.
 
     Examples:
         >>> import sagline as sl
@@ -78,7 +81,9 @@ class Sensors(_Replaceable):
     length_deviation: Array = field(default=LENGTH_DEVIATION, converter=given, metadata=rule("m", above=0.0))
     tension_deviation: Array | None = field(default=None, converter=if_known, metadata=rule("N", above=0.0))
     position_deviation: Array | None = field(default=None, converter=if_known, metadata=rule("m", above=0.0))
-    rotation_deviation: Array | None = field(default=None, converter=if_known, metadata=rule("rad", above=0.0))
+    rotation_deviation: Array | None = field(
+        default=None, converter=if_known, metadata=rule("rad", above=0.0, infinite=True)
+    )
     frame: Pose = field(default=None, kw_only=True, converter=_world_if_none)
     target: Array = field(default=(0.0, 0.0, 0.0), kw_only=True, converter=given)
 
@@ -91,13 +96,21 @@ class Sensors(_Replaceable):
                 if own.ndim > 1 or (own.ndim == 1 and axes not in (None, own.size)) or own.size == 0:
                     allowed, step = f"shape () or ({axes or 'm'},)", "Give one number, or one number per entry."
                     raise InvalidValueError(about.name, f"of shape {own.shape}", allowed, step)
+                if about.name == "rotation_deviation" and not np.isfinite(own if own.ndim == 0 else own[:2]).all():
+                    step = "Give None if rotations are not measured; only the third value may be infinite."
+                    raise InvalidValueError(about.name, "infinite", "finite about x and y", step)
                 object.__setattr__(self, about.name, own)
         object.__setattr__(self, "frame", single_pose(self.frame, "frame"))
         object.__setattr__(self, "target", exactly(self.target, "target", "m", (3,)))
 
 
+def measures_yaw(sensors: Sensors) -> bool:
+    """True if rotations are measured about all three axes."""
+    return sensors.rotation_deviation is not None and bool(np.isfinite(sensors.rotation_deviation).all())
+
+
 def reading_deviations(sensors: Sensors, cables: int) -> Array:
-    """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite without a sensor."""
+    """Standard deviations (2 m + 6,) of lengths, load cells, position and rotation; infinite for a missing sensor."""
     parts = (
         (sensors.length_deviation, cables),
         (sensors.tension_deviation, cables),
@@ -108,12 +121,12 @@ def reading_deviations(sensors: Sensors, cables: int) -> Array:
 
 
 def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
-    """Gain and bias [N] of a robot's load cells, (m,) or a number; gain 1 and bias 0 if the robot has no winches."""
+    """Gain and bias [N] of a robot's load cells, (m,) or numbers; gain 1 and bias 0 for a robot without winches."""
     return (1.0, 0.0) if robot.winches is None else (robot.winches.load_cell_gain, robot.winches.load_cell_bias)
 
 
 _BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "time", "commanded")
-_UNIT = 1e-6  # tolerance of the norm of a quaternion; sufficient for quaternions that are printed with seven digits
+_UNIT = 1e-6  # allowed error of a quaternion's norm; quaternions that were printed with seven digits are accepted
 
 
 @frozen(eq=False, repr=False, weakref_slot=False)
@@ -121,23 +134,23 @@ class WinchLog(_Replaceable, Saved, Tabular):
     """Readings of a robot at rest at N poses; NaN where a reading is missing.
 
     Attributes:
-        counts: Encoder counts, shape (N, m), or None. Either counts or lengths are given, not both. A calibration omits
-            rows with a missing count.
-        unstrained_length: Reported lengths off the drums [m], shape (N, m), or None.
+        counts: Encoder counts, shape (N, m); None if lengths are given. A calibration omits rows with a missing count.
+        unstrained_length: Reported lengths off the drums [m], shape (N, m); None if `counts` are given. Relative
+            lengths with unknown zeros may be negative.
         load_cells: Readings of the load cells at the frame ends [N], may be negative, shape (N, m), NaN if missing; or
             None.
         position: Position of the target in the axes of the measuring system [m], shape (N, 3), NaN for an unmeasured
             coordinate; or None.
-        rotation: Rotation of the platform in these axes as unit quaternions, scalar last, shape (N, 4), rows of NaN if
-            not measured; or None.
+        rotation: Rotation from the platform frame to the axes of the measuring system, as unit quaternions, scalar
+            last, shape (N, 4), rows of NaN if not measured; or None.
         time: Time of each row [s], shape (N,), in any order; or None.
         commanded: N commanded poses, near the actual poses; or None.
-        sensors: Standard deviations of all readings; None for `Sensors()`, which only has length deviations.
-        source: Origin of the readings.
+        sensors: Standard deviations of all readings; None for `Sensors()`, which contains only lengths.
+        source: Text that states the origin of the readings, such as a file name.
 
     Raises:
-        InvalidValueError: If counts and lengths are both given or both missing, a field is of the wrong kind, shape or
-            range, or the sensors lack the standard deviation of a reading.
+        InvalidValueError: If `counts` and `unstrained_length` are both given or both missing; if a field has a wrong
+            type, shape or value; if `sensors` has no standard deviation for a reading.
 
     Examples:
         >>> import numpy as np
@@ -176,7 +189,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
     source: str = ""
 
     def __attrs_post_init__(self) -> None:
-        """Check every field once, and the consistency of the fields."""
+        """Check every field once, and check that the fields are consistent."""
         name, unit_, values = _lengths_or_counts(self.counts, self.unstrained_length)
         read = _table(values, name, unit_, None, None)
         n, m = read.shape
@@ -209,7 +222,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
         return len(self.readings)
 
     def rows(self, which: Flags | Indices | slice) -> WinchLog:
-        """Log of some of the rows.
+        """Log with a selection of the rows.
 
         Args:
             which: Flags (N,), row indices, or a slice.
@@ -225,14 +238,55 @@ class WinchLog(_Replaceable, Saved, Tabular):
                 locked(values)  # a new array: no copy needed
         return evolve(self, **parts)
 
+    def at_rest(self, duration: float = 1.0) -> WinchLog:
+        """Log with one row for each rest of the robot: the mean readings of the rest.
+
+        A rest is a part in which no reading leaves a band of 8 standard deviations. The means of both halves differ by
+        at most half a standard deviation, apart from noise. The band of counts is a thousandth of their range. The
+        means are over the middle 80 % of a rest.
+
+        Args:
+            duration: Least duration of a rest [s], > 0.
+
+        Returns:
+            The log; `time` is the middle of each rest.
+
+        Raises:
+            InvalidValueError: If the log has no times, if they do not increase, or if the robot is never at rest.
+
+        Examples:
+            >>> import numpy as np
+            >>> import sagline as sl
+            >>> time = np.arange(0.0, 6.0, 0.1)
+            >>> length = 2.0 + 0.5 * np.clip(time - 2.0, 0.0, 2.0)
+            >>> log = sl.WinchLog(unstrained_length=length[:, None], time=time)
+            >>> print(log.at_rest().unstrained_length.round(3).tolist())
+            [[2.0], [3.0]]
+        """
+        readings = (
+            (self.counts, rest.deviation_of_counts(self.counts)),
+            (self.unstrained_length, self.sensors.length_deviation),
+            (self.load_cells, self.sensors.tension_deviation),
+            (self.position, self.sensors.position_deviation),
+            (rest.rotation_vectors(self.rotation), self.sensors.rotation_deviation),
+        )
+        parts = rest.rests_of(self.time, readings, number(duration, "duration", "s", above=0.0))
+        means: dict[str, Any] = {}
+        for name in _BY_ROW:
+            if isinstance(values := getattr(self, name), np.ndarray):
+                mean = rest.mean_rotation if name == "rotation" else rest.mean_of_rows
+                means[name] = np.array([mean(values[part]) for part in parts])
+        return evolve(self.rows(np.array([(part.start + part.stop) // 2 for part in parts])), **means)
+
     def __str__(self) -> str:
-        """Number of rows and the kinds of readings."""
+        """Text with the number of rows and the kinds of readings."""
         n, m = self.readings.shape
         parts = ["counts" if self.counts is not None else "lengths"]
+        turned = "rotation" if measures_yaw(self.sensors) else "inclination"
         for values, one, many in (
             (self.load_cells, "reading of load cells", "readings of load cells"),
             (self.position, "measured coordinate", "measured coordinates"),
-            (None if self.rotation is None else self.rotation[:, 0], "measured rotation", "measured rotations"),
+            (None if self.rotation is None else self.rotation[:, 0], f"measured {turned}", f"measured {turned}s"),
         ):
             if values is not None:
                 count = np.count_nonzero(~np.isnan(values))
@@ -243,7 +297,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
 
 
 def _lengths_or_counts(counts: ArrayLike | None, lengths: ArrayLike | None) -> tuple[str, str, ArrayLike]:
-    """Name, unit and values of the given counts or lengths."""
+    """Name, unit and values of the field that is given: counts or lengths."""
     if (counts is None) == (lengths is None):
         value = "neither given" if counts is None else "both given"
         step = "Give the counts, or the lengths that the drives computed from them."
@@ -252,13 +306,12 @@ def _lengths_or_counts(counts: ArrayLike | None, lengths: ArrayLike | None) -> t
 
 
 def _table(value: ArrayLike, item: str, unit: str, rows: int | None, columns: int | None) -> Array:
-    """Readings, with NaN for missing ones."""
-    low = 0.0 if item == "unstrained_length" else -np.inf
-    array = checked(value, item, unit, low=low, missing=True)
+    """Checked array of readings; NaN for a missing reading."""
+    array = checked(value, item, unit, missing=True)
     fits = array.ndim == 2 and rows in (None, array.shape[0]) and columns in (None, array.shape[1])
     if not fits or array.shape[1] == 0:
         n, m = ("N" if rows is None else rows), ("m" if columns is None else columns)
-        step = "Give a row for each pose, and in it a column for each cable."
+        step = "Give one row per pose and one column per cable."
         if columns in (3, 4) and item in ("position", "rotation"):
             step = "Give one row per row of the log, NaN for a missing measurement."
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape ({n}, {m})", step)
@@ -266,7 +319,7 @@ def _table(value: ArrayLike, item: str, unit: str, rows: int | None, columns: in
 
 
 def _quaternions(given: Array) -> Array:
-    """Unit quaternions; rows of NaN are kept."""
+    """Checked unit quaternions (N, 4); rows of NaN are allowed."""
     missing = np.isnan(given)
     whole = ~missing.any(axis=1)
     length = np.linalg.norm(given, axis=1)
@@ -283,7 +336,7 @@ def _quaternions(given: Array) -> Array:
 
 
 def _check_sensors(log: WinchLog, cables: int) -> None:
-    """Reject readings without a standard deviation, and deviations for another number of cables."""
+    """Reject readings without a standard deviation, and standard deviations for a wrong number of cables."""
     pairs = (
         ("length_deviation", log.readings, cables),
         ("tension_deviation", log.load_cells, cables),

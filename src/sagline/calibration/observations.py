@@ -1,4 +1,4 @@
-"""Predicted readings at equilibria: residuals, their derivatives by the parameters, and lengths at encoder counts."""
+"""Predicted readings at equilibria, residuals, derivatives by the parameters, and lengths at encoder counts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel
-from sagline.calibration.log import Sensors, load_cells_of
+from sagline.calibration.log import Sensors, load_cells_of, measures_yaw
 from sagline.calibration.parameters import Parameters, slopes_of_values
 from sagline.core.arrays import Array, kernel_input, locked
 from sagline.core.progress import blocks
@@ -23,10 +23,11 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-STEP: Final = 1e-4  # relative step of a drum radius or zero for difference quotients; lengths are nearly linear in both
-SLOPES: Final = 3  # length_zero, drum_radius and axial_stiffness, in the order of `kernels.calibration.observe`
-BLOCK: Final = 1 << 9  # number of poses per kernel call; this takes about 10 MB
-NO_LOAD: Final = locked(np.zeros((1, 6)))  # only cable forces and weight act on the platform
+STEP: Final = 1e-4  # relative step of a drum radius or length zero for difference quotients; lengths are nearly linear
+# length_zero, drum_radius, axial_stiffness, length_scale and clock_offset, as in `kernels.calibration.observe`
+SLOPES: Final = 5
+BLOCK: Final = 1 << 9  # number of poses per kernel call; its work arrays take about 10 MB
+NO_LOAD: Final = locked(np.zeros((1, 6)))  # no external wrench: only cable forces and weight act on the platform
 
 
 def lengths_at_counts(drums: Drums, counts: Array) -> Array:
@@ -40,13 +41,13 @@ def counts_at(drums: Drums, lengths: Array) -> Array:
 
 
 def has_drum_data(robot: Robot) -> bool:
-    """True if lengths follow from counts with the known data of the winches."""
+    """True if the robot has all data of its winches that the computation of lengths from counts needs."""
     names = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")
     return robot.winches is not None and all(getattr(robot.winches, name) is not None for name in names)
 
 
 def _known_field(of: Winch | Cable, name: str) -> Array:
-    """Value of a field, without None, because `drums_of` has checked it."""
+    """Value of a field of the winches; `drums_of` has checked that the field is not None."""
     return np.asarray(getattr(of, name))
 
 
@@ -56,24 +57,26 @@ class WhitenedRows(NamedTuple):
     The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured.
     """
 
-    # derivatives by the internal parameters, with adapted true lengths, (N, R, P); rows without a reading are zero. The
-    # internal parameter is the logarithm where `logarithmic` is True
+    # Derivatives by the internal parameters, (N, R, P), after elimination of the true lengths. Rows without a reading
+    # are zero. Where `logarithmic` is True, the internal parameter is the logarithm.
     matrix: Array
     misfit: Array  # readings minus predictions, (N, R)
-    residual: Array  # residuals in physical units [N, m, rad] at the given lengths, (N, m + 6); NaN if missing
+    residual: Array  # residuals [N, m, rad] at the given lengths, (N, m + 6); NaN if missing
     back: Array  # change of the true lengths [m] per unit of misfit, (N, m, R)
-    # motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows are per true
-    # length. The last row is for a step along a direction, with adapted lengths. There are no rows without a direction
+    # Motion of the platform's center of mass [m, rad], world axes, (N, m + 1, 6). Each of the first m rows is the
+    # motion per unit of a true length. The last row is the motion for a step along a direction. Without a direction, it
+    # has no rows.
     motion: Array
+    more: Array | int = 0  # straight cables: lengths minus observed motions of the pose, which are eliminated, (N,)
 
 
 def _locked_view(array: Array) -> Array:
-    """Write-locked contiguous view of an array; the kernels are compiled for such arrays."""
+    """Read-only contiguous view of an array, as the compiled kernels require."""
     return locked(np.ascontiguousarray(array).view())
 
 
 def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
-    """Sensors in the form of the kernel; a missing sensor has an infinite deviation."""
+    """Arrays of the sensors for the kernel; a missing sensor has an infinite standard deviation."""
     m, (gain, bias) = robot.cable_count, load_cells_of(robot)
 
     def spread(value: Array | None, count: int) -> Array:
@@ -92,13 +95,15 @@ def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
 
 
 class MachineTerms(NamedTuple):
-    """A robot with parameter values and its sensors, in the form of the kernel."""
+    """A robot with parameter values and its sensors, as arrays for the kernel."""
 
     model: CableModel
     parameters: Parameters
     robot: Robot  # the robot with the parameter values
     sensors: Sensors
     offset: Array  # offset of reported lengths [m], (m,)
+    scale: Array  # scale of reported lengths, (m,)
+    late: Array  # times by which the reported lengths are late [s], (m,)
     drums: Drums | None  # drums if counts are read; else None
     terms: ForwardTerms  # cable model in the form of the kernel
     body: Array  # body_table
@@ -108,15 +113,23 @@ class MachineTerms(NamedTuple):
 
 
 def machine_of(
-    robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
+    robot: Robot,
+    model: CableModel,
+    parameters: Parameters,
+    sensors: Sensors,
+    offset: Array | float = 0.0,
+    scale: Array | float = 1.0,
+    late: Array | float = 0.0,
 ) -> MachineTerms:
-    """A robot and its sensors in the form of the kernel; raises an error if drum data for counts are missing."""
+    """A robot and its sensors as arrays for the kernel; raises an error if counts need drum data that are missing."""
     machine = MachineTerms(
         model,
         parameters,
         robot,
         sensors,
-        offset,
+        np.broadcast_to(offset, robot.cable_count),
+        np.broadcast_to(scale, robot.cable_count),
+        np.broadcast_to(late, robot.cable_count),
         drums_of(robot) if parameters.counted else None,
         (model.code, *model.parameters, has_routing(robot) or None),
         body_table(robot),
@@ -128,20 +141,20 @@ def machine_of(
 
 
 def with_parameters(machine: MachineTerms, parameters: Parameters) -> MachineTerms:
-    """The same machine for other parameters; unknown pulleys and dead lengths need routing, even with zero values."""
+    """The machine with other unknowns. Unknown pulley radii and dead lengths need routing, even if they are zero."""
     routed = machine.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     terms = (*machine.terms[:-1], routed or None)
     return machine._replace(parameters=parameters, terms=terms, slopes=slopes_of_values(machine.robot, parameters))
 
 
 def winch_slopes(machine: MachineTerms, lengths: Array, counts: Array | None = None) -> Array:
-    """Derivatives of reported lengths (N, m) [m] by length_zero, drum_radius and axial_stiffness [m/N], (3, N, m).
+    """Derivatives of reported lengths (N, m) [m] by the unknowns of `SLOPES`, (5, N, m); zero for clock_offset.
 
-    counts: the readings (N, m); None for the counts at these lengths.
+    counts: read counts (N, m); None to compute the counts from the lengths.
     """
     slopes = np.zeros((SLOPES, *lengths.shape))
     if machine.drums is None:
-        slopes[0] = 1.0
+        slopes[0], slopes[3] = 1.0, (lengths - machine.offset) / machine.scale
         return slopes
     counts = counts_at(machine.drums, lengths) if counts is None else counts
     with_radius = bool((machine.parameters.where[kinds.DRUM] >= 0).any())
@@ -149,12 +162,12 @@ def winch_slopes(machine: MachineTerms, lengths: Array, counts: Array | None = N
     stiffness = robot.cables.axial_stiffness
     strain = winches.winding_tension / stiffness
     slopes[2] = lengths * strain / (stiffness * (1.0 + strain))
-    if winches.drum_distance is None and (winches.layers == 1.0).all():  # all turns have the same length
+    if winches.drum_distance is None and (winches.layers == 1.0).all():  # all turns on the drum have the same length
         slopes[0] = 1.0 / (1.0 + strain)
         if with_radius:
             radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
             circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
-            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # derivative of a helix length by the radius
+            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # derivative of one turn by the radius
             turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
             slopes[1] = turns * turn_slope / (1.0 + strain)
         return slopes
@@ -175,10 +188,10 @@ def whitened_rows(
     lengths: Array,
     direction: Array | None = None,
 ) -> WhitenedRows:
-    """Readings near equilibria to first order; NaN where the platform is not stable.
+    """Whitened readings and derivatives at equilibria; NaN where the equilibrium is not stable.
 
-    slopes: derivatives of reported lengths (3, N, m) from `winch_slopes`. If `direction` (P,) is given, only the slopes
-    along it are computed, and P is 1 in the result.
+    slopes: derivatives of reported lengths (5, N, m) from `winch_slopes`. If `direction` (P,) is given, only the slopes
+    along this direction are computed, so that P is 1 in the result.
     """
     count, m = lengths.shape
     parameters, factor, width = machine.parameters, machine.slopes, len(machine.slopes)
@@ -202,16 +215,26 @@ def whitened_rows(
         PoseReadings(*map(_locked_view, readings)),
         (where, locked(np.where(parameters.where >= 0, factor[parameters.where], 0.0)), _locked_view(slopes)),
         memory_for(m),
-        (*found, np.empty((rows + 6, width))),
+        (*found[:5], np.empty((rows + 6, width))),
     )
     return found
 
 
 def predicted_rows(
-    robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
+    robot: Robot,
+    model: CableModel,
+    parameters: Parameters,
+    sensors: Sensors,
+    poses: Array,
+    lengths: Array,
+    offset: Array | float = 0.0,
+    scale: Array | float = 1.0,
 ) -> WhitenedRows:
-    """Slopes of readings at equilibria, given by pose rows and unstrained lengths (N, m) [m]; the misfit is zero."""
-    machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
+    """Whitened slopes of the readings at equilibria with pose rows `poses` and unstrained lengths (N, m) [m].
+
+    offset [m], scale: of the reported lengths, each (m,) or one number.
+    """
+    machine = machine_of(robot, model, parameters, sensors, offset, scale)
     slopes, count = winch_slopes(machine, lengths), len(lengths)
     aligned = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
     readings = PoseReadings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), aligned)
@@ -219,22 +242,32 @@ def predicted_rows(
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
 
-EXACT: Final = 1e-10  # [m], deviation of lengths; it is too small to have an effect on the whitening
+EXACT: Final = 1e-10  # [m], standard deviation of lengths that is too small to affect the whitening
 
 
 def unit_sensors(sensors: Sensors) -> Sensors:
     """Sensors for all readings, each with a standard deviation of 1 in SI units, and with exact lengths."""
-    return Sensors(EXACT, 1.0, 1.0, 1.0, frame=sensors.frame, target=sensors.target)
+    rotation = [1.0, 1.0, 1.0 if sensors.rotation_deviation is None or measures_yaw(sensors) else np.inf]
+    return Sensors(EXACT, 1.0, 1.0, rotation, frame=sensors.frame, target=sensors.target)
 
 
 def unwhitened_slopes(
-    robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
+    robot: Robot,
+    model: CableModel,
+    parameters: Parameters,
+    sensors: Sensors,
+    poses: Array,
+    lengths: Array,
+    offset: Array | float = 0.0,
+    scale: Array | float = 1.0,
 ) -> tuple[Array, Array]:
-    """Derivatives of load cells, position, rotation in SI units: by values (N, m + 6, P), by lengths (N, m + 6, m)."""
+    """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths."""
     count, m = lengths.shape
     by_values, by_length = np.empty((count, m + 6, len(parameters.names))), np.empty((count, m + 6, m))
     for part in blocks(count, BLOCK):
-        rows = predicted_rows(robot, model, parameters, unit_sensors(sensors), poses[part], lengths[part])
+        rows = predicted_rows(
+            robot, model, parameters, unit_sensors(sensors), poses[part], lengths[part], offset, scale
+        )
         by_values[part] = rows.matrix / slopes_of_values(robot, parameters)
         by_length[part] = np.swapaxes(rows.back, 1, 2) / EXACT**2
     return by_values, by_length

@@ -1,4 +1,4 @@
-"""Outliers: poses that do not fit the other poses, and the wrong length, load cell or measured pose at these poses."""
+"""Outliers: poses that do not fit the other poses, and the wrong readings at these poses."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import chdtrc, gammaln
 
@@ -15,37 +16,39 @@ from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
 from sagline.calibration.parameters import Unknown, parameters_of
 from sagline.calibration.problem import FitProblem, SearchState
+from sagline.calibration.straight import lines_at
 from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.kernels import codes
 from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 
 CHANCE: Final = 0.01  # probability that a log without errors has an outlier by chance
-EXAMINED: Final = 100  # largest number of examined poses; if more poses do not fit, the calibration is wrong
+EXAMINED: Final = 100  # largest number of examined poses; if more poses do not fit, the whole calibration is wrong
 _MOST: Final = 3  # largest number of single errors at one pose; with more errors, the whole pose is the outlier
-_CLEAR: Final = 3.0  # two explanations are distinguishable if their log probabilities differ by more than this
-_REST: Final = 0.1  # allowance for errors of the calibration, relative to the decrease of the squares by one error
-_WORTH: Final = 20.0  # an explanation is not computed exactly if its linear log probability is lower by more than this
-_NONLINEAR: Final = 0.6  # ratio of squares after and before a linear fit below which large errors are fitted exactly
-_DROP: Final = 500.0  # quantile of chi squared
+_CLEAR: Final = 3.0  # smallest difference of log probabilities for which one explanation is preferred to another
+_REST: Final = 0.1  # one error explains a pose if it leaves at most this share of the sum of squares
+_WORTH: Final = 20.0  # largest difference from the best log probability for which an explanation is refined
+_NONLINEAR: Final = 0.6  # a linear fit that leaves a smaller share of the sum of squares is refined by a nonlinear fit
+_DROP: Final = 500.0  # quantile of chi squared above which the tail is computed by its asymptote
 _ITERATIONS: Final = 10
-_TOLERANCE: Final = 1e-3  # relative tolerance of the sum of squares
+_TOLERANCE: Final = 1e-3  # a fit stops if the sum of squares decreases by less than this value
 _HALVINGS: Final = 6
 
 
 class _Suspect(NamedTuple):
     """A possible error at a pose."""
 
-    quantity: str  # quantity of the `Outlier`
+    quantity: str  # "length", "load cell", "position" or "rotation"
     cable: int | None  # index of the cable, or None
-    which: Indices  # indices of the changed lengths and readings among all 2 m + 6
+    which: Indices  # indices of the wrong lengths and readings among the 2 m + 6 of a pose
 
 
 class _SuspectFit(NamedTuple):
-    """Best fit of a pose if the suspects may have any errors."""
+    """Best fit of a pose without the readings of the suspects."""
 
     squares: float  # remaining sum of squares
     sizes: list[float]  # error of each suspect
-    deviations: list[float]  # errors in standard deviations
+    deviations: list[float]  # error of each suspect in standard deviations
 
 
 class _Case(NamedTuple):
@@ -59,7 +62,17 @@ class _Case(NamedTuple):
     read: Flags  # flags of the available readings, (m + 6,)
 
     def misses(self) -> tuple[Array, Array]:
-        """Reported minus true lengths, and readings minus predictions, (2 m + 6,); slopes by length, (m + 6, m)."""
+        """Misfits (2 m + 6,) of lengths and readings, and derivatives (m + 6, m) of readings by true lengths.
+
+        For straight cables: derivatives (2 m + 6, n) of lengths and readings by the free motions of the platform.
+        """
+        m = self.lengths.shape[1]
+        if self.machine.model.code == codes.STRAIGHT:
+            lines = lines_at(self.machine, self.readings, self.pose)
+            off, by_pose = np.full(2 * m + 6, np.nan), np.zeros((2 * m + 6, lines.by_pose.shape[2]))
+            there = np.r_[:m, 2 * m : 2 * m + 6]
+            off[there], by_pose[there] = lines.residual[0], lines.by_pose[0]
+            return off, by_pose
         slopes = np.zeros((observations.SLOPES, 1, self.lengths.shape[1]))
         rows = observations.whitened_rows(self.machine, self.readings, slopes, self.pose, self.lengths)
         off = np.concatenate((self.readings.lengths[0] - self.lengths[0], rows.residual[0]))
@@ -67,10 +80,12 @@ class _Case(NamedTuple):
 
 
 def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _SuspectFit:
-    """Best fit of a pose if the suspects may have any errors; a linear fit if the number of iterations is 1."""
+    """Best fit of a pose without the readings of the suspects `taken`; a linear fit if `iterations` is 1."""
     which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
     counts = np.concatenate((np.ones(case.lengths.shape[1], dtype=np.bool_), case.read))
     counts[which] = False
+    if case.machine.model.code == codes.STRAIGHT:
+        return _fit_of_pose(case, taken, which)
     fit, wanted, squares = _linear_fit(case, taken, which, counts)
     for _ in range(iterations - 1):
         better = _improved(case, counts, wanted, squares)
@@ -83,10 +98,29 @@ def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _S
     return fit if iterations == 1 else fit._replace(squares=squares)
 
 
+def _fit_of_pose(case: _Case, taken: Sequence[_Suspect], which: Indices) -> _SuspectFit:
+    """Best linear fit of a pose with straight cables, and of the errors of the readings `which`."""
+    off, by_pose = case.misses()
+    read = ~np.isnan(off) & np.isfinite(case.deviation)
+    columns = (np.hstack((by_pose, np.eye(len(off))[:, which])) / case.deviation[:, None])[read]
+    misses = off[read] / case.deviation[read]
+    inverse = np.linalg.pinv(columns)
+    found, errors = inverse @ misses, inverse @ inverse.T
+    rest, first, sizes, deviations = misses - columns @ found, by_pose.shape[1], [], []
+    for one in taken:
+        part = slice(first, first + len(one.which))
+        own = found[part]
+        sizes.append(float(own[0]) if one.cable is not None else float(np.linalg.norm(own)))
+        squares = float(own @ np.linalg.pinv(errors[part, part], hermitian=True) @ own)
+        deviations.append(max(squares, 0.0) ** 0.5)
+        first = part.stop
+    return _SuspectFit(float(rest @ rest), sizes, deviations)
+
+
 def _linear_fit(
     case: _Case, taken: Sequence[_Suspect], which: Indices, counts: Flags
 ) -> tuple[_SuspectFit, Array, float]:
-    """Best linear fit, its true lengths (m,), and the sum of squares before the fit."""
+    """Best linear fit, the true lengths (m,) after the fit, and the sum of squares before the fit."""
     misses, by_length = case.misses()
     m, read = case.lengths.shape[1], case.read
     slopes, variance = by_length[read], case.deviation[:m] ** 2
@@ -111,7 +145,7 @@ def _linear_fit(
 
 
 def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Case | None:
-    """Case with a smaller sum of squares, at lengths between the present lengths and `target`; None if not found."""
+    """Case with a smaller sum of squares, at lengths between the present lengths and `wanted`; None if not found."""
     robot, model = case.machine.robot, case.machine.model
     for halving in range(_HALVINGS):
         lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
@@ -125,8 +159,8 @@ def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Cas
     return None
 
 
-def misfitting(squares: Array, readings: Indices) -> Indices:
-    """Indices of at most `EXAMINED` poses that fit worse than by chance; squares: (N,), NaN for unused poses."""
+def misfitting(squares: Array, readings: NDArray[np.integer]) -> Indices:
+    """Indices of at most `EXAMINED` poses with a misfit that chance does not explain; `squares`: NaN if unused."""
     known = np.where(np.isfinite(squares), squares, 0.0)
     bad = np.flatnonzero(known > exceeded_with(CHANCE / max(len(squares), 1), readings))
     return np.sort(bad[np.argsort(-known[bad], kind="stable")][:EXAMINED])
@@ -135,11 +169,11 @@ def misfitting(squares: Array, readings: Indices) -> Indices:
 def outliers_in(
     problem: FitProblem, state: SearchState, which: Indices, rows: Indices, *, count: int
 ) -> tuple[Outlier, ...]:
-    """Causes of the misfit at the poses `which`, in the order of the log's rows.
+    """Outliers that explain the misfit at the poses `which`, in the order of the rows of the log.
 
-    For every length, load cell, measured position or rotation of a pose, the best-fitting error is computed. The first
-    error is the one that explains most of the misfit, the second error explains most of the remaining misfit. If
-    several cables or no cable can explain the misfit, the whole pose is the outlier.
+    At each pose, an error of every length, load cell, measured position and rotation is fitted. The outlier is the
+    error that explains most of the misfit. Further outliers explain the remaining misfit. If several cables or no cable
+    can explain the misfit, the whole pose is the outlier.
     """
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = problem.reported_lengths(machine)
@@ -147,7 +181,7 @@ def outliers_in(
     read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3]))) & np.isfinite(deviation[m:])
     exact = observations.unit_sensors(machine.sensors)
     parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), exact, counted=False)  # not used
-    exactly = observations.machine_of(machine.robot, problem.model, parameters, exact, np.zeros(m))
+    exactly = observations.machine_of(machine.robot, problem.model, parameters, exact)
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)
@@ -158,7 +192,7 @@ def outliers_in(
 
 
 def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
-    """Outliers at a pose; the quantity of a whole pose is the kind of reading with the largest error."""
+    """Outliers at a pose. If the whole pose is the outlier, it gets the quantity with the largest error."""
     m = case.lengths.shape[1]
     whole = _fit_suspects(case, (), 1)
     cells = np.flatnonzero(case.read[:m]).tolist()
@@ -175,7 +209,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         near_best = np.array(rough) < min(rough) + _WORTH
         close = [suspects[k] for k in np.flatnonzero(near_best)]
         fits = [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
-        # no suspect explains the readings, possibly because the linear fits were inaccurate
+        # If no suspect explains the readings, the linear fits may be inaccurate. Other suspects are fitted exactly.
         if min(fit.squares for fit in fits) > _limit(case.read, (*taken, close[0]), count):
             likely = ~near_best & (np.array([fit.squares for fit in first]) < _NONLINEAR * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
@@ -188,7 +222,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         limit = _limit(case.read, (*taken, close[best]), count)
         enough = fits[best].squares <= max(limit, 0.0 if taken else _REST * whole.squares)
         if not alone:
-            if enough and not taken and len(near) == 1:  # the readings do not identify one cable
+            if enough and not taken and len(near) == 1:  # one wrong quantity, but its cable is unknown
                 return [Outlier(row, None, near.pop(), abs(fits[best].sizes[0]), fits[best].deviations[0])]
             break
         taken.append(close[best])
@@ -205,14 +239,14 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
 
 
 def _limit(there: Flags, taken: Sequence[_Suspect], count: int) -> float:
-    """Largest sum of squares by chance for the worst of `count` poses, without the terms of the suspects."""
+    """Largest sum of squares that chance explains at the worst of `count` poses, without the readings of suspects."""
     used = sum(len(one.which) for one in taken)
     return float(exceeded_with(CHANCE / count, int(there.sum()) - used))
 
 
 def _rarity(before: float, after: _SuspectFit, suspect: _Suspect) -> float:
-    """Log probability that chance alone improves the fit by this amount."""
+    """Log probability that chance alone reduces the sum of squares from `before` to `after.squares`."""
     half, drop = 0.5 * len(suspect.which), max(before - after.squares, 0.0)
     if drop < _DROP:
         return float(np.log(chdtrc(len(suspect.which), drop)))
-    return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # asymptote of the tail
+    return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # asymptote of the chi squared tail

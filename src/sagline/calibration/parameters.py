@@ -1,4 +1,4 @@
-"""Unknowns of a calibration: their kinds, the parameters of a robot, and robots with other parameters."""
+"""Unknowns of a calibration, parameters of a robot, and robots with other parameter values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.calibration.log import Sensors
+from sagline.calibration.log import Sensors, measures_yaw
 from sagline.core.arguments import choice, elements, flag, instance
 from sagline.core.arrays import Array, Flags, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
@@ -22,18 +22,19 @@ from sagline.robot.winch import Winch
 
 
 class Kind(NamedTuple):
-    """A kind of unknown."""
+    """A kind of unknown: a physical quantity of the robot or of its sensors."""
 
-    owner: str  # object that has the field: "robot", its "cables" or "winches", or the measuring "system"
-    unit: str  # its unit in SI
+    owner: str  # object with the quantity: "robot", "cables", "winches", or "system" for the measuring system
+    unit: str  # SI unit of the quantity
     first: int  # first row of the kind in `kernels.calibration.kinds`
-    axes: tuple[str, ...]  # names of its components, ("",) for a single number
+    axes: tuple[str, ...]  # names of the components, ("",) for a quantity that is a single number
     each: bool  # True if every cable has its own value
     shared: bool  # True if all cables share one value by default
     logarithmic: bool  # True if the logarithm is estimated, because the value is positive and its deviation is relative
     deviation: float  # standard deviation of a value from a drawing or data sheet, relative if logarithmic
-    assumed: float  # standard deviation of a value that is missing in the robot's source
-    needs: str = ""  # the readings that observe the kind: "counts", "load cells", "positions"; "" for any readings
+    assumed: float  # standard deviation of a value that the robot's source does not state
+    # readings that depend on the quantity: "counts", "lengths", "load cells", "positions", "motion"; "" for all
+    needs: str = ""
     common: float = 0.0  # share of the prior variance that the values of all cables have in common, 0 to 1
 
 
@@ -54,6 +55,8 @@ KINDS: Final[dict[str, Kind]] = {
     "mass": Kind("robot", "kg", kinds.MASS, _ONE, False, False, True, 0.05, 0.2),
     "center_of_mass": Kind("robot", "m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
     "measuring_frame": Kind("system", "m", kinds.SHIFT, _SIX, False, False, False, 10.0, 10.0, "positions"),
+    "length_scale": Kind("system", "", kinds.SCALE, _ONE, True, False, False, 0.02, 0.1, "lengths"),
+    "clock_offset": Kind("system", "s", kinds.CLOCK, _ONE, True, True, False, 0.1, 1.0, "motion"),
     "target": Kind("system", "m", kinds.TARGET, _XYZ, False, False, False, 0.1, 1.0, "positions"),
 }
 
@@ -67,9 +70,9 @@ class Unknown:
     Attributes:
         name: Name of a kind in `KINDS`.
         shared: True if the cables share one value; None for the default of the kind.
-        deviation: Standard deviation of the robot's value, in the unit of the kind; for drum radius, linear density,
-            axial stiffness and mass, as a share of the value. Infinite without a prior. None for the robot's tolerance
-            or, if it has none, the usual deviation of the kind.
+        deviation: Standard deviation of the robot's value, in the unit of the quantity; for drum radius, linear
+            density, axial stiffness and mass, as a share of the value. Infinite for no prior. None for the robot's
+            tolerance or, if the robot has no tolerance, a typical deviation.
     """
 
     name: str
@@ -77,10 +80,10 @@ class Unknown:
     deviation: float | None = None
 
     def __post_init__(self) -> None:
-        """Check name, shared and deviation.
+        """Check `name`, `shared` and `deviation`.
 
         Raises:
-            InvalidValueError: If the kind does not exist, or the deviation is not positive.
+            InvalidValueError: If `KINDS` does not contain `name`, or `deviation` is not positive.
         """
         object.__setattr__(self, "name", str(choice(self.name, "unknown", KINDS)))
         if self.shared is not None:
@@ -99,14 +102,14 @@ class Parameters(Result):
         names: Kind of each parameter, (P,).
         labels: Name of each parameter, for example "frame_anchors[3].x", "axial_stiffness", "measuring_frame.about z".
         units: Unit of each parameter.
-        cables: Cable of each parameter, or -1 for a parameter of all cables or of the platform.
-        where: Index of the parameter for each row of `kernels.calibration.kinds` and each cable, (KIND_ROWS, m); -1 if
-            it is not an unknown.
+        cables: Index of the cable of each parameter; -1 for a parameter that does not belong to one cable.
+        where: Index of the parameter for each row of `kernels.calibration.kinds` and each cable, (KIND_ROWS, m); -1 for
+            a value that is not estimated.
         prior: Prior values, in the units of the parameters, (P,).
         prior_deviation: Standard deviations of the priors, in the same units, (P,); infinite without a prior.
-        stated: True where the robot's tolerances or the caller give the prior, (P,).
-        logarithmic: True where the logarithm is estimated, (P,).
-        counted: True if the readings are encoder counts; otherwise they are lengths, and length_zero is their offset.
+        stated: True for a parameter with a prior from the robot's tolerances or the caller, (P,).
+        logarithmic: True for a parameter of which the logarithm is estimated, (P,).
+        counted: True if the log has encoder counts; False if it has lengths, for which length_zero is an offset.
     """
 
     names: tuple[str, ...]
@@ -123,10 +126,14 @@ class Parameters(Result):
 
 UNKNOWNS: Final = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 OF_CELLS: Final = ("load_cell_gain", "load_cell_bias")
+OF_FORCES: Final = ("axial_stiffness", "linear_density", "mass", "center_of_mass", *OF_CELLS)
+DEFAULT: Final = "default"  # in a list of unknowns, it means the default unknowns
 
 
-def default_unknowns(sensors: Sensors) -> tuple[str, ...]:
-    """Unknowns if the caller names none: with gains and biases of the load cells as soon as these are read."""
+def _default_unknowns(sensors: Sensors, *, straight: bool) -> tuple[str, ...]:
+    """Default unknowns, with gains and biases of the load cells if `sensors` has load cells; `straight`: no forces."""
+    if straight:
+        return UNKNOWNS[:2]
     return UNKNOWNS if sensors.tension_deviation is None else (*UNKNOWNS, *OF_CELLS)
 
 
@@ -134,15 +141,14 @@ _NOTHING: Final = {"dead_cable": "0 m", "pulley_radius": "0 m"}
 
 
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
-    """Parameters of the unknowns, in the order of the unknowns; parameters of one unknown are sorted by cable and axis.
+    """Parameters in the order of `unknowns`; the parameters of each unknown are sorted by cable and axis.
 
-    Raises an error for a repeated unknown, for a value that the robot lacks, and for an unknown without a reading and
-    without a stated prior.
+    Raises an error if an unknown is repeated, has no value in the robot, or has neither readings nor a stated prior.
     """
     m = robot.cable_count
     where = np.full((kinds.KIND_ROWS, m), -1, dtype=np.int64)
     rows: list[tuple[str, str, str, int, float, float, bool, bool]] = []
-    for unknown in checked_unknowns(unknowns):
+    for unknown in checked_unknowns(unknowns, sensors):
         kind = KINDS[unknown.name]
         _refuse_unobserved(robot, sensors, unknown, kind, counted)
         own = _value(robot, sensors, unknown.name, counted)
@@ -161,27 +167,33 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
     return Parameters(names, labels, units, cables, locked(where), priors, deviations, flags, logarithmic, counted)
 
 
-def checked_unknowns(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
-    """Checked list of unknowns without repetitions."""
-    items = elements(unknowns, str | Unknown, "unknowns", 'Give ("frame_anchors", "mass"), for example.')
-    if not items:
-        raise InvalidValueError("unknowns", "none", "one at least", f"Name some of {', '.join(KINDS)}.")
+def checked_unknowns(unknowns: Sequence[str | Unknown], sensors: Sensors, *, straight: bool = False) -> list[Unknown]:
+    """Checked list of unknowns without repetitions; "default" is replaced by the default unknowns."""
+    given = elements(unknowns, str | Unknown, "unknowns", 'Give ("frame_anchors", "mass"), for example.')
+    if not given:
+        raise InvalidValueError("unknowns", "none", "at least one", f"Name some of {', '.join(KINDS)}.")
+    items = [
+        one for item in given for one in (_default_unknowns(sensors, straight=straight) if item == DEFAULT else (item,))
+    ]
     found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
     names = [one.name for one in found]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Name every unknown once.")
+    if idle := [name for name in names if straight and name in OF_FORCES]:
+        value, step = "without effect on straight cables", "Leave it out, or use the default model."
+        raise InvalidValueError(f"unknown: {idle[0]}", value, "parameters of the geometry", step)
     return found
 
 
 def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
-    """Values of a kind, shape (m or 1, axes)."""
+    """Values of the quantity `name`, shape (m or 1, axes)."""
     m, kind = robot.cable_count, KINDS[name]
     if name == "measuring_frame":
         return np.concatenate((sensors.frame.position, np.zeros(3)))[None]
     if name == "target":
         return np.asarray(sensors.target)[None]
-    if name == "length_zero" and not counted:
-        return np.zeros((m, 1))
+    if name in ("length_scale", "clock_offset") or (name == "length_zero" and not counted):
+        return np.full((m, 1), float(name == "length_scale"))
     value = _field(robot, name)
     if value is None:
         begin = _NOTHING.get(name, "..., as drawn")
@@ -193,28 +205,32 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
 
 
 def _field(robot: Robot, name: str) -> Array | None:
-    """Values of a kind in a robot; None if the robot does not have them."""
-    if robot.winches is None and name in OF_CELLS:  # load cells without winches read the tension
+    """Values of a quantity of a robot; None if the robot does not have this quantity."""
+    if robot.winches is None and name in OF_CELLS:  # default load cells have no gain or bias error
         return np.asarray(getattr(Winch(), name))
     return value_of(robot, name)
 
 
 def is_observed(kind: Kind, sensors: Sensors, counted: bool) -> bool:
-    """True if there are readings of the type that a kind of unknown needs."""
+    """True if the log has the kind of readings that the unknown `kind` needs."""
     return {
         "": True,
         "counts": counted,
+        "lengths": not counted,
+        "motion": False,  # `calibrate` checks the times of a log
         "load cells": sensors.tension_deviation is not None,
-        "positions": sensors.position_deviation is not None or sensors.rotation_deviation is not None,
+        "positions": sensors.position_deviation is not None or measures_yaw(sensors),
     }[kind.needs]
 
 
 def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: Kind, counted: bool) -> None:
     """Reject unknowns with neither observations nor a prior."""
-    if is_observed(kind, sensors, counted) or unknown.deviation is not None or unknown.name in robot.tolerances:
+    known = unknown.deviation is not None or unknown.name in robot.tolerances
+    if known or kind.needs == "motion" or is_observed(kind, sensors, counted):
         return
     add = {
         "counts": "Add counts to the log, or leave it out.",
+        "lengths": "Give lengths in place of counts, or leave it out; drum_radius is the scale of counts.",
         "load cells": "Add load cells to the log, or give a prior: Unknown(name, deviation=...); or leave it out.",
         "positions": "Add measured positions to the log, or leave it out.",
     }[kind.needs]
@@ -222,7 +238,7 @@ def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: K
 
 
 def _is_shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
-    """True if the cables share one value, which requires equal values and equal deviations."""
+    """True if all cables share one value. Sharing requires equal values and equal deviations of all cables."""
     alike = bool((own == own[0]).all() and (width == width[0]).all())
     if unknown.shared is None:
         return kind.shared and alike
@@ -234,7 +250,7 @@ def _is_shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
 
 
 def _prior_deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> tuple[Array, bool]:
-    """Prior deviation in the unit of the kind, shape of `own`, and True if it was stated."""
+    """Prior standard deviations of the values `own`, and True if they come from the caller or from tolerances."""
     if unknown.deviation is not None:
         width = np.full(own.shape, unknown.deviation)
         return (width * np.abs(own) if kind.logarithmic else width), True
@@ -251,20 +267,20 @@ def _prior_deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> 
 
 
 def internal(parameters: Parameters, values: Array) -> Array:
-    """Internal parameters (P,) of values: the logarithms where `logarithmic` is True."""
+    """Internal parameters (P,): the logarithm of a value where `parameters.logarithmic` is True, else the value."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(parameters.logarithmic, np.log(values), values)
 
 
 def external(parameters: Parameters, numbers: Array) -> Array:
-    """Values in their units (P,) of internal parameters."""
+    """Values (P,) in their units, computed from the internal parameters `numbers`; inverse of `internal`."""
     with np.errstate(over="ignore"):
         return np.where(parameters.logarithmic, np.exp(numbers), numbers)
 
 
-@lru_cache(maxsize=8)  # a search asks many times for the root of the same parameters
+@lru_cache(maxsize=8)  # a search needs the root of the same parameters many times
 def prior_root(parameters: Parameters) -> Array:
-    """Symmetric root of the inverse prior correlation, (P, P): the identity, except for kinds with a common share."""
+    """Symmetric root (P, P) of the inverse prior correlation; the identity if no kind has a `common` share."""
     root = np.eye(len(parameters.names))
     for kind in KINDS.values():
         which = parameters.where[kind.first]
@@ -276,7 +292,7 @@ def prior_root(parameters: Parameters) -> Array:
 
 
 def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
-    """Derivatives of the values by the internal parameters (P,): the value for a logarithm, otherwise 1."""
+    """Derivatives (P,) of the values by the internal parameters: the value for a logarithm, otherwise 1."""
     slopes = np.ones(len(parameters.names))
     for name in dict.fromkeys(parameters.names):
         kind = KINDS[name]
@@ -288,7 +304,7 @@ def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
 
 
 def quantities_of(parameters: Parameters, numbers: Array) -> dict[str, Array]:
-    """Numbers of the parameters (P,) by quantity of the robot, each in the shape of the quantity."""
+    """Dictionary from names of the robot's quantities to arrays, in which `numbers` (P,) are sorted by quantity."""
     found = {}
     for name in dict.fromkeys(parameters.names):
         if name not in UNCERTAIN or (name == "length_zero" and not parameters.counted):
@@ -301,12 +317,12 @@ def quantities_of(parameters: Parameters, numbers: Array) -> dict[str, Array]:
 
 
 def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
-    """Robot with other parameter values (P,); an error if they are invalid."""
+    """Robot with the parameter values `values` (P,); raises an error if a value is invalid."""
     return with_quantities(robot, quantities_of(parameters, values))
 
 
 def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sensors:
-    """Sensors with other values (P,) of frame and target; rotations are relative to the given frame."""
+    """Sensors with the target and measuring frame of `values` (P,), which are relative to `sensors.frame`."""
     changes: dict[str, Any] = {}
     if "target" in parameters.names:
         changes["target"] = values[parameters.where[kinds.TARGET : kinds.TARGET + 3, 0]]
@@ -320,17 +336,21 @@ def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sen
 
 
 def offset_with(robot: Robot, parameters: Parameters, values: Array) -> Array:
-    """Offset of reported lengths [m], (m,)."""
-    if parameters.counted or "length_zero" not in parameters.names:
-        return np.zeros(robot.cable_count)
-    return np.asarray(values[parameters.where[kinds.ZERO]])
+    """Offset (m,) that is added to reported lengths [m] after their scaling; zero for counts."""
+    return np.zeros(robot.cable_count) if parameters.counted else values_in(parameters, values, kinds.ZERO, 0.0)
 
 
-_SMALL = 1e-4  # [rad], for a smaller angle, the first terms of the series are sufficient
+def values_in(parameters: Parameters, values: Array, row: int, otherwise: float) -> Array:
+    """Values (m,) of the cables in the row `row` of `kinds`; `otherwise` for a cable without this parameter."""
+    where = parameters.where[row]
+    return np.where(where >= 0, values[where], otherwise)
+
+
+_SMALL = 1e-4  # [rad]; for smaller angles, the first terms of the power series are sufficient
 
 
 def left_jacobian(vector: Array) -> Array:
-    """J with exp(v + dv) = exp(J dv) exp(v), for a rotation vector [rad] of shape (3,)."""
+    """Matrix J with exp(v + dv) = exp(J dv) exp(v) for the rotation vector v = `vector` [rad], shape (3,)."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -341,12 +361,12 @@ def left_jacobian(vector: Array) -> Array:
     return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
 
 
-_FIXED: Final = 5e-2  # a parameter counts as known if its stated deviation, relative to the usual deviation, is smaller
-_WIDE: Final = 1e3  # largest prior deviation, relative to the usual deviation of an unknown value
+_FIXED: Final = 5e-2  # a parameter is known if its stated deviation is less than this share of the usual deviation
+_WIDE: Final = 1e3  # largest used prior deviation, in multiples of the usual deviation of an unknown value
 
 
 class PriorUnits(NamedTuple):
-    """Unknowns in standard deviations of their priors."""
+    """Units in which directions are computed: standard deviations of the priors."""
 
     scale: Array  # one standard deviation in the internal parameters, (P,)
     units: Array  # one standard deviation in the units of the parameters, (P,)
@@ -354,9 +374,9 @@ class PriorUnits(NamedTuple):
 
 
 def prior_units(parameters: Parameters) -> PriorUnits:
-    """Units of the directions: prior deviations, or the usual deviation of an unknown value if there is no prior.
+    """Unit of each parameter: its prior deviation or, without a prior, the usual deviation of an unknown value.
 
-    A larger prior deviation is reduced to `_WIDE`, because rounding would otherwise hide the other parameters.
+    A unit is at most `_WIDE` usual deviations, because rounding would otherwise hide the other parameters.
     """
     usual = np.array([KINDS[name].assumed for name in parameters.names])
     usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)

@@ -1,4 +1,4 @@
-"""Calibration poses, and their text."""
+"""Choice of calibration poses before any measurement, and text of the chosen poses."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from sagline.calibration.candidates import CandidatePoses, candidates_of, shorte
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import has_drum_data, predicted_rows
 from sagline.calibration.parameters import (
+    DEFAULT,
     KINDS,
     Parameters,
     Unknown,
-    default_unknowns,
     parameters_of,
     prior_root,
     slopes_of_values,
@@ -30,16 +30,17 @@ from sagline.core.memory import check_memory
 from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved
+from sagline.robot.batch import refuse_slanted
 from sagline.robot.checks import ROTATING
 from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 
 WIDTH: Final = 80
-COLUMNS: Final = (20, 9, 13, 13, 15)  # width of the table of errors, in columns
-NARROW: Final = (16, 8, 9, 11, 13)  # width for a narrow terminal
+COLUMNS: Final = (20, 9, 13, 13, 15)  # widths of the columns of the table of errors, in characters
+NARROW: Final = (16, 8, 9, 11, 13)  # the same widths for a narrow terminal
 WIDE: Final = 2 + sum(COLUMNS)
-KILO: Final = 1e4  # [N], larger tensions are written in kN
-FAR: Final = 100.0  # [m], larger positions are written with one decimal fewer
+KILO: Final = 1e4  # [N]; tensions are written in kN if one of them exceeds this value
+FAR: Final = 100.0  # [m]; positions are written with fewer decimals if one of them exceeds this value
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -48,20 +49,19 @@ class CalibrationPoses(Result, Saved):
 
     Attributes:
         robot: The robot.
-        sensors: Its sensors.
+        sensors: The sensors with readings at every pose.
         parameters: The unknowns.
         poses: Poses, N of them.
         frame_end_tension: Tensions at the frame ends [N], (N, m).
-        unstrained_length: All cable off the drums [m], (N, m).
-        expected_error: Standard error of each parameter, in its unit, (P,).
-        random_error: Median standard errors of sets of equally many random poses, (P,).
-        share_of_random: Errors divided by the errors of random poses, as a geometric mean over the observable
-            directions. Errors of single parameters do not show this ratio if a direction is unobservable, such as a
-            shift of the world.
-        gain: Log det of the information from the first k chosen poses, (N,).
-        enough: Smallest number of poses at which an additional pose reduces no error by more than 1 %; N if there is
-            none.
-        most_helpful: Recommended measurement, in words.
+        unstrained_length: Unstrained lengths off the drums [m], (N, m).
+        expected_error: Standard error of each parameter after a calibration at the poses, in its unit, (P,).
+        random_error: Standard error of each parameter with N random poses, as a median over sets of poses, (P,).
+        share_of_random: Errors with the chosen poses divided by errors with random poses, as a geometric mean over the
+            observable directions. The errors of single parameters also contain unobservable directions, such as a shift
+            of the world, which no choice of poses can improve.
+        gain: Increase of the log det of the information by the first k chosen poses, k = 1 to N, (N,).
+        enough: Number of poses after which one more pose reduces no error by more than 1 %; N if every pose helps more.
+        most_helpful: Sentence that recommends an additional measurement.
     """
 
     robot: Robot
@@ -82,18 +82,18 @@ class CalibrationPoses(Result, Saved):
         return len(self.poses)
 
     def __str__(self) -> str:
-        """Expected errors, in lines of at most 80 columns."""
+        """Text of the expected errors, in lines of at most 80 characters."""
         return poses_text(self)
 
     def table(self) -> str:
-        """Poses and tensions, one pose per line."""
+        """Text with poses and tensions, one pose per line."""
         return poses_table(self)
 
 
 def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Expected errors of calibration poses and of random poses, in lines of at most `width` columns."""
+    """Text with expected errors at the chosen poses and at random poses, in lines of at most `width` characters."""
     position, read, share = plan.poses.position, plan.sensors, plan.share_of_random
-    places = position[np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1)))]  # without repetitions
+    places = position[np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1)))]  # no repetition
     way = n(tour_length(places, np.arange(len(places))), ".3g", "m")
     what = f"{counted(len(plan), 'pose')} to find {counted(len(plan.parameters.names), 'number')} of {plan.robot.name}"
     sensors = (
@@ -103,7 +103,7 @@ def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
         ("rotations", read.rotation_deviation, "rad"),
     )
     texts = [
-        f"{words} ({information.error_text(float(np.max(deviation)), unit)})"
+        f"{words} ({information.error_text(float(np.max(deviation[np.isfinite(deviation)])), unit)})"
         for words, deviation, unit in sensors
         if deviation is not None
     ]
@@ -127,7 +127,7 @@ def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
 
 
 def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Poses and tensions in driving order, one pose per line; a line that is too long continues on the next one."""
+    """Text with poses and tensions in driving order, one pose per line; lines longer than `width` are wrapped."""
     position, tension = plan.poses.position, plan.frame_end_tension
     angles = np.degrees(plan.poses.rotation.as_euler("ZYX"))
     decimals = 1 if np.abs(position).max() >= FAR else 2
@@ -152,14 +152,14 @@ def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
 
 
 def _column(head: str, values: Iterable[float], decimals: int) -> list[str]:
-    """Column of numbers below its heading, with a common width."""
+    """Cells of a table column of equal width: the heading `head`, then the numbers."""
     cells = [head, *(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)]
     width = 1 + max(map(len, cells))
     return [f"{cell:>{width}}" for cell in cells]
 
 
 def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
-    """Lines with the root mean square errors of each kind."""
+    """Lines with the root mean square of the errors for each kind of parameter."""
     names = np.array(plan.parameters.names)
     first, *others = COLUMNS if width >= WIDE else NARROW
     heads = (*zip(("numbers", "before", "afterwards", "random poses"), others, strict=True),)
@@ -176,12 +176,12 @@ def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
             yield f"  {name:<{first}}" + "".join(f"{cell:>{own}}" for cell, own in cells)
 
 
-MOST: Final = 1_000  # largest number of poses; more take days to measure
+MOST: Final = 1_000  # largest number of poses; the measurement of more poses would take days
 MOST_CANDIDATES: Final = 20_000
-DRAWS: Final = 21  # sets of random poses, for a median
-ENOUGH: Final = 0.01  # relative improvement of an error; smaller ones are irrelevant
-SEEN: Final = 3.0  # smallest ratio of a direction's information to the prior one; this halves the error
-LOOSE: Final = 10.0  # unit of a parameter without a prior, relative to the usual deviation of an unknown value
+DRAWS: Final = 21  # number of sets of random poses, for a median of their errors
+ENOUGH: Final = 0.01  # a smaller relative improvement of an error is irrelevant
+SEEN: Final = 3.0  # information of a direction divided by its prior information; 3 halves the error
+LOOSE: Final = 10.0  # largest unit of a parameter, in multiples of the usual deviation of an unknown value
 _CATENARY: Final = Catenary()
 
 
@@ -198,26 +198,27 @@ def calibration_poses(
 ) -> CalibrationPoses:
     """Choose the most informative poses and tension sets for the unknowns, before any measurement.
 
-    The choice is D-optimal, by a greedy algorithm with exchanges. The candidates are feasible poses of a box, each with
-    several sets of tensions. All sets of tensions at one pose follow each other in the result.
+    A greedy algorithm with exchanges makes a D-optimal choice among candidates. The candidates are feasible poses of a
+    box, each with several sets of tensions. The result lists all chosen sets of tensions of a pose before the next
+    pose.
 
     Args:
         robot: The robot before the calibration.
-        count: Number of sets of readings, 1 to 1,000.
+        count: Number of sets of readings, each at one pose with one set of tensions, 1 to 1,000.
         unknowns: Parameters to estimate, as in `calibrate`.
         sensors: Sensors with readings at every pose; None for lengths with a deviation of 0.5 mm, and load cells with
             the load_cell_deviation of the winches, or 1 % of the median tension.
         box: Box of poses; None for the robot's test_box.
-        candidates: Number of candidates (a pose with a set of tensions), `count` to 20,000.
-        seed: Seed of the candidates and of the random poses for comparison.
-        progress: Called after every few candidates with the number of finished poses and the number of all poses.
+        candidates: Number of candidates, `count` to 20,000; a candidate is a pose with one set of tensions.
+        seed: Seed of the random numbers that determine the candidates and the random poses for comparison.
+        progress: Called repeatedly with the number of finished poses and the number of all poses.
 
     Returns:
         The poses, their tensions and lengths, and the expected errors.
 
     Raises:
-        InvalidValueError: If there is no box, not enough of it is feasible, no reading observes the unknowns, or an
-            argument is of the wrong kind or out of range.
+        InvalidValueError: If `box` is missing, or has too few feasible poses; if no reading depends on an unknown; if
+            an argument has a wrong type or is out of range.
 
     Examples:
         >>> import sagline as sl
@@ -229,7 +230,7 @@ def calibration_poses(
     Source:
         Fedorov 1972; Borm & Menq 1991 (choice of calibration poses); docs/model.md, section 14.
     """
-    instance(robot, Robot, "robot")
+    refuse_slanted(instance(robot, Robot, "robot"))
     size = whole_number(count, "count", 1, MOST)
     tried = whole_number(candidates, "candidates", size, MOST_CANDIDATES)
     drawn = whole_number(seed, "seed", 0)
@@ -241,8 +242,7 @@ def calibration_poses(
     if read.tension_deviation is None and read.position_deviation is None and read.rotation_deviation is None:
         step = "Give Sensors(tension_deviation=...), or leave sensors out."
         raise InvalidValueError("sensors", "lengths alone", "load cells, positions or rotations in addition", step)
-    asked = default_unknowns(read) if unknowns is None else unknowns
-    parameters = parameters_of(robot, asked, read, counted=has_drum_data(robot))
+    parameters = parameters_of(robot, (DEFAULT,) if unknowns is None else unknowns, read, counted=has_drum_data(robot))
     check_memory(
         f"{tried:,} candidates",
         8.0 * 3.0 * tried * (robot.cable_count + 6) * len(parameters.names),
@@ -300,7 +300,7 @@ def _default_sensors(robot: Robot, tensions: Array) -> Sensors:
 
 
 def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
-    """Unit of each internal parameter, and the inverse of its prior deviation in this unit: 0 (no prior) to 1."""
+    """Units (P,) of the internal parameters, and inverse prior deviations (P,) in these units; 0 without a prior."""
     deviation = parameters.prior_deviation / np.abs(slopes)
     loose = np.array([LOOSE * KINDS[name].assumed for name in parameters.names])
     scale = np.fmin(deviation, loose)
@@ -308,13 +308,13 @@ def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
 
 
 def _read(rows: Array) -> Array:
-    """Rows of the sensors with readings; one row of zeros if no sensor has readings."""
+    """Rows of `rows` that belong to a sensor with readings; one row of zeros if no sensor has readings."""
     there = rows.any(axis=(0, 2))
     return np.ascontiguousarray(rows[:, there] if there.any() else rows[:, :1])
 
 
 def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: Array) -> None:
-    """Reject too few poses, and unknowns without observations and prior."""
+    """Reject a box with fewer feasible poses than `count`, and unknowns with neither readings nor a prior."""
     if len(rows) < count:
         value = f"{count}, with {len(rows)} of {tried} candidates feasible and stable"
         step = "Give a smaller count, more candidates, or a box with more feasible poses."
@@ -328,7 +328,7 @@ def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: 
 
 
 def _driving_order(chosen: CandidatePoses) -> Indices:
-    """Order of the poses: a short tour of the positions, and at each position by increasing sum of tensions."""
+    """Order of the candidates: a short tour of the positions; at each position, the sum of tensions increases."""
     _, first, place = np.unique(chosen.place, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
     rank[shortest_tour(chosen.poses[first, :3])] = np.arange(len(first))
@@ -336,14 +336,14 @@ def _driving_order(chosen: CandidatePoses) -> Indices:
 
 
 def _random(rows: Array, usual: Flags, count: int, seed: int) -> list[Array]:
-    """Whitened rows (count, k, P) at several sets of random poses."""
+    """Whitened slopes (count, k, P) of `DRAWS` sets of `count` random poses."""
     rng = np.random.default_rng((seed, 1))
     pool = np.flatnonzero(usual) if usual.sum() >= count else np.arange(len(rows))
     return [rows[rng.choice(pool, count, replace=False)] for _ in range(DRAWS)]
 
 
 def _share(known: Array, rows: Array, random: list[Array]) -> float:
-    """Ratio of errors to errors from random poses, in directions with prior errors that random poses at least halve."""
+    """Ratio of errors to errors with random poses, in directions in which random poses at least halve prior errors."""
     own, *others = (information.information_of(each) for each in (rows, *random))
     size, vectors = np.linalg.eigh(np.mean(others, axis=0))
     seen = vectors[:, size > SEEN]
@@ -354,7 +354,7 @@ def _share(known: Array, rows: Array, random: list[Array]) -> float:
 
 
 def _sufficient_count(deviation: Array) -> int:
-    """Smallest number of poses at which an additional pose reduces no error by more than 1 %; deviation: (N, P)."""
+    """Number of poses after which one more pose reduces no error by more than 1 %; deviation: errors (N, P)."""
     lowered = (1.0 - deviation[1:] / deviation[:-1]).max(axis=1)
     still = np.flatnonzero(lowered > ENOUGH)
     return int(still[-1]) + 2 if still.size else 1

@@ -1,15 +1,23 @@
-"""The estimation problem of a calibration, its initial state, and the states of its search."""
+"""Estimation problem of a calibration, its initial state, and the states of the search for a solution."""
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
-from sagline.calibration.log import Sensors, WinchLog, load_cells_of
-from sagline.calibration.observations import NO_LOAD, MachineTerms, WhitenedRows, lengths_at_counts, machine_of
+from sagline.calibration.log import Sensors, WinchLog, load_cells_of, measures_yaw
+from sagline.calibration.observations import (
+    NO_LOAD,
+    MachineTerms,
+    WhitenedRows,
+    lengths_at_counts,
+    machine_of,
+    winch_slopes,
+)
 from sagline.calibration.parameters import (
     KINDS,
     Parameters,
@@ -18,34 +26,40 @@ from sagline.calibration.parameters import (
     offset_with,
     prior_root,
     sensors_with,
+    values_in,
     with_values,
 )
-from sagline.core.arrays import Array, Indices, locked
+from sagline.calibration.straight import lines_at
+from sagline.core.arrays import Array, Flags, locked
+from sagline.kernels import codes
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.observe import starting_lengths
+from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.forward import search
+from sagline.kinematics.forward import centered_positions, search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-_PAIRS: Final = 3  # number of measured points that are required to align a measuring system
-_LINE: Final = 1e-3  # points count as collinear if their distance from a line is less than this share of their extent
-_NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds with a typical value of zero
+_PAIRS: Final = 3  # smallest number of measured points that determine the axes of a measuring system
+_LINE: Final = 1e-3  # points are collinear if their distance from a line is less than this share of their extent
+_NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds with a lower bound of zero, which is also a typical value
 
 
 class ReadingsTable(NamedTuple):
-    """Readings at N poses, NaN if missing."""
+    """Arrays with the readings at N poses; NaN for a missing reading."""
 
     counts: Array | None  # encoder counts, (N, m), or None
     lengths: Array | None  # reported lengths [m], (N, m), or None; exactly one of counts and lengths is given
     cells: Array  # load cell readings [N], (N, m)
     positions: Array  # measured positions [m], (N, 3)
     rotations: Array  # measured rotations as unit quaternions, (N, 4)
+    # speed [m/s] and acceleration [m/s^2] of the reported lengths, (2, N, m); None if clock_offset is not estimated
+    motion: Array | None = None
 
 
 def readings_table(log: WinchLog) -> ReadingsTable:
-    """Readings of a log with NaN in place of missing columns."""
+    """Readings of a log as a table; columns that the log does not have are NaN."""
     count, m = log.readings.shape
     columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
     tables = (np.broadcast_to(np.nan, (count, width)) if read is None else read for read, width in columns)
@@ -53,7 +67,7 @@ def readings_table(log: WinchLog) -> ReadingsTable:
 
 
 class FitProblem(NamedTuple):
-    """The estimation problem."""
+    """The estimation problem: robot, cable model, sensors, unknown parameters and readings."""
 
     robot: Robot  # the robot before the calibration
     model: CableModel
@@ -63,29 +77,51 @@ class FitProblem(NamedTuple):
 
     @property
     def prior(self) -> Array:
-        """Prior of the internal parameters, (P,)."""
+        """Prior values (P,) of the internal parameters."""
         return internal(self.parameters, self.parameters.prior)
 
     @property
     def prior_deviation(self) -> Array:
-        """Standard deviation of the prior, (P,)."""
+        """Standard deviations (P,) of the priors of the internal parameters."""
         known, prior = self.parameters.prior_deviation, self.parameters.prior
         return np.asarray(known / np.where(self.parameters.logarithmic, prior, 1.0))
 
+    @property
+    def relative(self) -> bool:
+        """True if reported lengths have unknown zeros without a prior, so that they say nothing before the fit."""
+        zeros = self.parameters.where[kinds.ZERO]
+        wide = np.isinf(self.parameters.prior_deviation[zeros]) & (zeros >= 0)
+        return not self.parameters.counted and bool(wide.any())
+
+    @property
+    def from_level(self) -> bool:
+        """True if the initial rotations are level, because reported lengths are too inaccurate for a search."""
+        placed = not np.isnan(self.log.positions).any(axis=1).all()
+        return self.relative or (self.straight and placed)
+
+    @property
+    def straight(self) -> bool:
+        """True for straight cables: poses are fitted to lengths, without a force balance."""
+        return self.model.code == codes.STRAIGHT
+
+    def readings(self, reported: Array, part: slice) -> PoseReadings:
+        """Readings at the poses `part` with the reported lengths `reported` (n, m) [m]."""
+        return PoseReadings(reported, self.log.cells[part], self.log.positions[part], self.log.rotations[part])
+
     def missed(self, numbers: Array) -> Array:
-        """Internal parameters minus their prior, in prior standard deviations, (P,)."""
+        """Differences (P,) between the internal parameters `numbers` and their priors, in prior standard deviations."""
         return np.asarray(self.prior_root @ (numbers - self.prior))
 
     @property
     def prior_root(self) -> Array:
-        """Root of the prior information: a matrix W, (P, P); W^T W is the inverse of the prior covariance."""
+        """Matrix W (P, P), for which W^T W is the inverse of the prior covariance."""
         return np.asarray(prior_root(self.parameters) / self.prior_deviation)
 
     @property
     def scale(self) -> Array:
-        """Scale of each internal parameter (P,): the smaller of its prior and its usual deviation.
+        """Scale (P,) of each internal parameter: its prior deviation or its usual deviation, whichever is smaller.
 
-        With larger scales, rounding would hide the sums of squares of well-observed parameters.
+        With a larger scale, rounding errors would hide the sums of squares of well-observed parameters.
         """
         usual = np.array([KINDS[name].assumed for name in self.parameters.names])
         return np.asarray(np.fmin(self.prior_deviation, usual))
@@ -96,22 +132,37 @@ class FitProblem(NamedTuple):
         return np.array([0.0 if name in _NONNEGATIVE else -np.inf for name in self.parameters.names])
 
     def machine_at(self, numbers: Array) -> MachineTerms:
-        """Robot and sensors with internal parameters (P,); an error if they are invalid for the robot."""
+        """Robot and sensors with the internal parameters `numbers` (P,); raises an error if the robot rejects them."""
         values, parameters = external(self.parameters, numbers), self.parameters
         robot = with_values(self.robot, parameters, values)
         sensors, offset = sensors_with(self.sensors, parameters, values), offset_with(self.robot, parameters, values)
-        return machine_of(robot, self.model, parameters, sensors, offset)
+        scale = values_in(parameters, values, kinds.SCALE, 1.0)
+        late = values_in(parameters, values, kinds.CLOCK, 0.0)
+        return machine_of(robot, self.model, parameters, sensors, offset, scale, late)
 
     def reported_lengths(self, machine: MachineTerms, part: slice = slice(None)) -> Array:
-        """Lengths reported by the winches [m], (n, m), for some of the poses."""
+        """Lengths (n, m) [m] that the winches report at the poses `part`."""
+        late = 0.0
+        if self.log.motion is not None:
+            speed, acceleration = self.log.motion[:, part]
+            late = machine.late * (speed + 0.5 * machine.late * acceleration)
         if self.log.counts is not None and machine.drums is not None:
-            return lengths_at_counts(machine.drums, self.log.counts[part])
+            return lengths_at_counts(machine.drums, self.log.counts[part]) + late
         assert self.log.lengths is not None
-        return np.asarray(self.log.lengths[part] + machine.offset)
+        return np.asarray(machine.scale * (self.log.lengths[part] + late) + machine.offset)
+
+    def winch_slopes(self, machine: MachineTerms, lengths: Array, part: slice, *, counted: bool = True) -> Array:
+        """Derivatives (5, n, m) of the reported lengths (n, m) [m] at the poses `part`; counted: at the read counts."""
+        counts = self.log.counts[part] if counted and self.log.counts is not None else None
+        slopes = winch_slopes(machine, lengths, counts)
+        if self.log.motion is not None:
+            speed, acceleration = self.log.motion[:, part]
+            slopes[4] = machine.scale * (speed + machine.late * acceleration)
+        return slopes
 
 
 class SearchState(NamedTuple):
-    """A state of the search."""
+    """State of the search: parameter values with lengths and poses in equilibrium."""
 
     numbers: Array  # internal parameters, (P,)
     machine: MachineTerms  # the robot with these parameters
@@ -120,19 +171,19 @@ class SearchState(NamedTuple):
 
 
 class Normal(NamedTuple):
-    """Normal equations of all poses at a state."""
+    """Normal equations of the least-squares problem at a state."""
 
     matrix: Array  # J^T W J of all poses, without the prior, (P, P)
-    gradient: Array  # J^T W y, (P,)
+    gradient: Array  # J^T W y of all poses, without the prior, (P,)
     squares: Array  # sum of squares of each pose, (N,); infinite for a pose without an equilibrium
-    readings: Indices  # number of readings at each pose, (N,)
+    readings: NDArray[np.int16]  # number of readings at each pose, (N,); small integers save memory
     weights: Array  # weights of the poses, (N,)
-    # whitened readings if the log has one block; None for a longer log, because storing them takes too much memory
+    # whitened readings of all poses; None for a log longer than one block, which would need too much memory
     rows: WhitenedRows | None
 
 
 class Fit(NamedTuple):
-    """Result of the least squares."""
+    """Result of the least-squares search."""
 
     state: SearchState  # last state
     normal: Normal  # normal equations at this state
@@ -144,31 +195,50 @@ Evaluated = tuple[SearchState, Normal]
 
 
 def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
-    """Initial state: the priors, with the platform at commanded poses or at poses from the reported lengths.
+    """Initial state: prior values, and poses that are measured, commanded or computed from the reported lengths.
 
-    The true lengths follow from these poses and the measured tensions. One millimeter of a steel cable changes its
-    tension by 90 N. Reported lengths therefore do not determine the tensions as long as the anchors are inaccurate.
+    The true lengths are computed from these poses and the measured tensions. The reported lengths would give wrong
+    tensions, because an anchor error of one millimeter changes the tension of a steel cable by about 90 N.
     """
     numbers = problem.prior
     offset = offset_with(problem.robot, problem.parameters, problem.parameters.prior)
     machine = machine_of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
     reported = problem.reported_lengths(machine)
     poses = _poses(problem, machine, reported, commanded)
-    lengths = held_lengths(problem, machine, poses, reported)
+    if problem.straight:
+        lengths = lines_at(machine, problem.readings(reported, slice(None)), poses).lengths
+    else:  # with the reported lengths, noise makes cables slack, which the measured rotations then contradict
+        sensors = problem.sensors
+        lone = sensors.rotation_deviation is not None and sensors.position_deviation is None
+        balanced = lone and sensors.tension_deviation is None
+        lengths = held_lengths(problem, machine, poses, reported, balanced=balanced)
     aligned = _aligned(problem, numbers, poses)
+    if problem.relative:
+        aligned = aligned.copy() if aligned is numbers else aligned
+        zeros, off = problem.parameters.where[kinds.ZERO], np.nanmedian(lengths - reported, axis=0)
+        for at in np.unique(zeros):
+            aligned[at] += off[zeros == at].mean()
     return SearchState(aligned, machine if aligned is numbers else problem.machine_at(aligned), lengths, poses)
 
 
-def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array) -> Array:
-    """Unstrained lengths [m] from the measured tensions at poses; the reported length where no tension is measured."""
-    if problem.sensors.tension_deviation is None:
+def held_lengths(
+    problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array, *, balanced: bool = False
+) -> Array:
+    """Unstrained lengths [m] from poses and measured tensions; the reported length where a tension is missing.
+
+    With `balanced`, or if reported lengths are relative, a missing tension is the cable's share of the weight or its
+    lower limit, whichever is larger.
+    """
+    balanced = balanced or problem.relative
+    if problem.sensors.tension_deviation is None and not balanced:
         return reported.copy()
     robot, cells = machine.robot, problem.log.cells
     gain, bias = load_cells_of(robot)
     tension = np.maximum((cells - bias) / gain, 0.0)
     read = ~np.isnan(tension)
     usual = np.sum(np.where(read, tension, 0.0), axis=1) / np.maximum(np.count_nonzero(read, axis=1), 1)
-    tension = np.where(read, tension, usual[:, None])
+    share = np.maximum(robot.tension_min, robot.mass * robot.gravity / robot.cable_count)
+    tension = np.where(read, tension, np.where(usual[:, None] > 0.0, usual[:, None], share))
     lengths = np.empty(reported.shape)
     starting_lengths(
         problem.model.terms(robot.gravity),
@@ -180,40 +250,52 @@ def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, repor
         memory_for(robot.cable_count),
         lengths,
     )
-    held = np.isfinite(lengths) & np.any(read, axis=1, keepdims=True)
+    held = np.isfinite(lengths) & (np.any(read, axis=1, keepdims=True) | balanced)
     return np.where(held, lengths, reported)
 
 
 def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commanded: Pose | None) -> Array:
-    """Initial pose rows: measured poses; otherwise commanded poses; otherwise poses from the reported lengths."""
+    """Initial pose rows: measured poses if available, else commanded poses, else poses by the reported lengths."""
     if commanded is not None:
         poses = np.array(pose_rows(commanded))
         poses = np.broadcast_to(poses, (len(reported), poses.shape[1])).copy()
+    elif problem.from_level:
+        level = np.array([0.0, 0.0, 0.0, 1.0])
+        poses = np.tile(np.append(centered_positions(machine.robot, level), level), (len(reported), 1))
     else:
         found = search(machine.robot, problem.model, locked(reported.view()), NO_LOAD, None)
         poses = found.poses.copy()
     if np.any(problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0):
-        return poses  # the position of the measuring system is not known yet
+        return poses  # measured poses cannot be used before the pose of the measuring system is known
     sensors, log = machine.sensors, problem.log
-    turned = ~np.isnan(log.rotations).any(axis=1)
-    placed = ~np.isnan(log.positions).any(axis=1)
+    placed, turned = _measured(problem)
     frame = sensors.frame
     if turned.any():
         poses[turned, 3:] = (frame.rotation * Rotation.from_quat(log.rotations[turned])).as_quat()
-    both = placed & turned
+    both = placed & (turned | problem.from_level | (commanded is not None and problem.straight))
     if both.any():
         target = frame.position + log.positions[both] @ frame.matrix.T
-        poses[both, :3] = target - Rotation.from_quat(poses[both, 3:]).apply(sensors.target.copy())
+        moved = target - Rotation.from_quat(poses[both, 3:]).apply(sensors.target.copy())
+        if problem.from_level or problem.straight:  # a planar platform stays in its plane
+            free = machine.robot.freedom[:, :3]
+            moved = poses[both, :3] + (moved - poses[both, :3]) @ free.T @ free
+        poses[both, :3] = moved
     return poses
 
 
+def _measured(problem: FitProblem) -> tuple[Flags, Flags]:
+    """Rows with a whole measured position, and rows with a whole measured rotation, (N,)."""
+    placed, turned = (~np.isnan(read).any(axis=1) for read in (problem.log.positions, problem.log.rotations))
+    return np.asarray(placed), np.asarray(turned & measures_yaw(problem.sensors))
+
+
 def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
-    """Parameters after alignment of the measuring system to the poses, if it is unknown and has enough readings."""
+    """Parameters after alignment of an unknown measuring system to `poses`; unchanged if there are too few readings."""
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:
         return numbers
     frame, log, platform = problem.sensors.frame, problem.log, Rotation.from_quat(poses[:, 3:])
-    placed, turned = ~np.isnan(log.positions).any(axis=1), ~np.isnan(log.rotations).any(axis=1)
+    placed, turned = _measured(problem)
     read = log.positions[placed]
     there = poses[placed, :3] + platform[placed].apply(problem.sensors.target.copy())
     if turned.any():
@@ -230,7 +312,7 @@ def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
 
 
 def _spans(points: Array) -> bool:
-    """True if points (N, 3) determine a rotation, because they are not collinear."""
+    """True if points (N, 3) are not collinear, so that they determine a rotation."""
     if len(points) < _PAIRS:
         return False
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -11,13 +11,16 @@ from sagline.cables.model import CableModel
 from sagline.calibration import findings, summary
 from sagline.calibration.findings import Findings, SensorDeviation
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import unwhitened_slopes
-from sagline.calibration.parameters import Parameters
+from sagline.calibration.observations import machine_of, unwhitened_slopes, winch_slopes
+from sagline.calibration.parameters import Parameters, values_in
+from sagline.calibration.straight import slopes_of_poses
 from sagline.core.arguments import choice, flag
 from sagline.core.arrays import Array, locked, numbers
 from sagline.core.indices import evenly_spaced
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, Saved
+from sagline.kernels import codes
+from sagline.kernels.calibration import kinds
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_rows import ForwardSolution
 from sagline.kinematics.inverse import inverse
@@ -28,17 +31,17 @@ from sagline.statics.tables import pose_rows
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PoseError(Result):
-    """Expected errors of the platform at commanded poses, for a single pose or with a leading axis N.
+    """Expected errors of the platform at one commanded pose, or at N commanded poses with a leading axis N.
 
-    The winches are set to the lengths of the calibrated robot at the commanded pose. The errors follow from the
-    covariance of all parameters and the standard deviation of the winches' lengths.
+    At a commanded pose, the winches have the lengths that the calibrated robot needs. The errors are computed from the
+    covariance of all parameters and the standard deviation of the lengths.
 
     Attributes:
         pose: The commanded poses.
         covariance: Covariance of the displacement of the platform frame's origin and of its rotation vector, world
             axes, shape (..., 6, 6) [m^2, m rad, rad^2].
-        own_covariance: Covariance of errors in the robot's own frame. They exclude the shift and the rotation about the
-            vertical that are common to all poses of the log.
+        own_covariance: As `covariance`, but without a shift of the robot and a rotation of the robot about the vertical
+            that are common to all poses of the log.
     """
 
     pose: Pose
@@ -46,7 +49,7 @@ class PoseError(Result):
     own_covariance: Array
 
     def __str__(self) -> str:
-        """Errors in one line, root mean squares over the feasible poses."""
+        """Text of the errors in one line, as root mean squares over the feasible poses."""
         held = ~np.isnan(self.position)
         world, own, turn = (
             n(float(np.sqrt(np.mean(one[held] ** 2))), ".3g", unit) if held.any() else "–"
@@ -57,17 +60,17 @@ class PoseError(Result):
 
     @property
     def position(self) -> Array:
-        """Root mean square distance from the commanded position [m], shape (...)."""
+        """Expected distance from the commanded position [m], as a root mean square, shape (...)."""
         return _root_of_trace(self.covariance[..., :3, :3])
 
     @property
     def own_position(self) -> Array:
-        """Root mean square distance from `own_covariance` [m], shape (...)."""
+        """Expected distance [m] according to `own_covariance`, as a root mean square, shape (...)."""
         return _root_of_trace(self.own_covariance[..., :3, :3])
 
     @property
     def rotation(self) -> Array:
-        """Root mean square angle [rad], shape (...)."""
+        """Expected angle between actual and commanded rotation [rad], as a root mean square, shape (...)."""
         return _root_of_trace(self.covariance[..., 3:, 3:])
 
 
@@ -75,22 +78,34 @@ def _root_of_trace(covariance: Array) -> Array:
     return locked(np.asarray(np.sqrt(np.trace(covariance, axis1=-2, axis2=-1))))
 
 
-MOST = 300  # largest number of poses from which the motion that is common to all poses is computed
-_NEGLIGIBLE = 1e-12  # slopes that are smaller, relative to the largest slope, count as zero
-_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # no effect on poses
+MOST = 300  # largest number of poses for the computation of the motion that is common to all poses
+_NEGLIGIBLE = 1e-12  # a slope is zero if it is less than this share of the largest slope
+# kinds without an effect on poses
+_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias", "clock_offset")
 
 
 def motion_slopes(
-    robot: Robot, model: CableModel, parameters: Parameters, poses: Array, lengths: Array
+    robot: Robot,
+    model: CableModel,
+    parameters: Parameters,
+    poses: Array,
+    lengths: Array,
+    offset: Array | float = 0.0,
+    scale: Array | float = 1.0,
 ) -> tuple[Array, Array]:
-    """Derivatives of origin and rotation vector [m, rad] at equilibria: by values (N, 6, P), by lengths (N, 6, m)."""
+    """Derivatives of the pose (origin, rotation vector) [m, rad]: (N, 6, P) by values and (N, 6, m) by lengths."""
     m = robot.cable_count
-    by_values, by_length = unwhitened_slopes(robot, model, parameters, Sensors(), poses, lengths)
+    if model.code == codes.STRAIGHT:
+        machine = machine_of(robot, model, parameters, Sensors(), offset, scale)
+        by_values, by_length = slopes_of_poses(machine, winch_slopes(machine, lengths), poses)
+        by_values = by_values / machine.slopes
+        return np.where(np.isin(parameters.names, _WITHOUT_MOTION), 0.0, by_values), by_length
+    by_values, by_length = unwhitened_slopes(robot, model, parameters, Sensors(), poses, lengths, offset, scale)
     return np.where(np.isin(parameters.names, _WITHOUT_MOTION), 0.0, by_values[:, m:]), by_length[:, m:]
 
 
 def _common_motions(poses: Array) -> Array:
-    """Derivatives of poses by a shift of the world and a rotation about the vertical, (N, 6, 4)."""
+    """Derivatives (N, 6, 4) of poses by three shifts of the world and a rotation about the vertical."""
     slopes = np.zeros((len(poses), 6, 4))
     slopes[:, :3, :3] = np.eye(3)
     slopes[:, 0, 3], slopes[:, 1, 3] = -poses[:, 1], poses[:, 0]
@@ -99,7 +114,7 @@ def _common_motions(poses: Array) -> Array:
 
 
 def _transformed_covariance(slopes: Array, covariance: Array, negligible: Array | float = 0.0) -> Array:
-    """Covariance (..., k, k) after a linear map (..., k, P); infinite where an unobserved value has an effect."""
+    """Covariance (..., k, k) after a linear map `slopes` (..., k, P); infinite where infinite variances have effect."""
     infinite = np.isinf(np.diagonal(covariance, axis1=-2, axis2=-1))
     finite = np.where(infinite[..., :, None] | infinite[..., None, :], 0.0, covariance)
     found = np.asarray(slopes @ finite @ np.swapaxes(slopes, -1, -2))
@@ -111,7 +126,7 @@ def _transformed_covariance(slopes: Array, covariance: Array, negligible: Array 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Calibration(Findings, Saved):
-    """Result of `calibrate`: P parameters from the readings at N poses.
+    """Result of `calibrate`: P parameters, estimated from the readings at N poses.
 
     Attributes:
         robot: The calibrated robot.
@@ -122,23 +137,22 @@ class Calibration(Findings, Saved):
         parameters: The parameters and their priors.
         values: Values of the parameters, in their units, (P,).
         covariance: Covariance of the values, (P, P); infinite on the diagonal without observations and a prior. It
-            includes the tolerances of the robot for parameters that were not estimated.
+            includes the effect of the tolerances of parameters that were not estimated.
         chi_squared: Sum of squares of all residuals in standard deviations, priors included.
-        degrees_of_freedom: Expected value of chi_squared: number of readings and lengths minus the estimated
-            parameters.
-        rows: Rows of the log that were used, (N,).
-        left_out: Omitted rows of the log, by reason.
+        degrees_of_freedom: Expected value of `chi_squared`: number of readings and priors minus estimated parameters.
+        rows: Indices of the rows of the log that were used, (N,).
+        left_out: Indices of the omitted rows of the log, for each reason.
         poses: Poses of the platform, N of them.
         unstrained_length: True lengths of the cables [m], (N, m).
         residuals: Readings minus predictions: lengths [m], load cells [N], position [m], rotation [rad], shape (N, 2 m
             + 6); NaN if missing.
         chi_squared_of_pose: Chi squared of each pose, (N,).
-        weights: Weights of the poses, (N,); less than 1 for a pose that does not fit the others.
+        weights: Weights of the poses, (N,); less than 1 for a pose that does not fit the other poses.
         outliers: Readings that do not fit.
-        gauge: Unobservable directions; the priors determine the values along these directions.
+        gauge: Unobservable directions; only the priors determine the values along these directions.
         cannot_tell_apart: Weakly identifiable directions.
         criticisms: Parameters that were not estimated, although the readings contradict their values.
-        cross_validation: Errors at omitted poses; None without cross-validation.
+        cross_validation: Errors of predictions at poses that a calibration did not use; None without cross-validation.
         iterations: Number of iterations of the least squares.
         model: Cable model.
         log: Origin of the readings.
@@ -158,20 +172,20 @@ class Calibration(Findings, Saved):
         return float(self.values[k]), float(self.standard_error[k])
 
     def __str__(self) -> str:
-        """Verdict, values with their standard errors, and diagnostics, in lines of 80 columns."""
+        """Text with verdict, values, standard errors and diagnostics, in lines of at most 80 characters."""
         return summary.calibration_text(self)
 
     def pose_error(self, pose: PoseLike) -> PoseError:
-        """Expected error of the platform at a commanded pose, with this calibration.
+        """Expected error of the platform at a commanded pose after this calibration.
 
-        The winches of the true robot are set to the lengths that `inverse` computes for the calibrated robot. Errors of
-        the calibration and of the winches' lengths (`sensors.length_deviation`) displace the platform.
+        The true robot has the lengths that `inverse` computes for the calibrated robot. Errors of the calibration and
+        errors of the winches' lengths (`sensors.length_deviation`) displace the platform.
 
         Args:
             pose: A single pose or N.
 
         Returns:
-            PoseError; NaN if the pose is not feasible, infinite if it depends on an unobserved parameter.
+            PoseError; NaN for an infeasible pose, infinite for a pose that depends on an unobserved parameter.
 
         Raises:
             InvalidValueError: If `pose` is not a pose, or is outside the motion pattern of the robot.
@@ -187,21 +201,26 @@ class Calibration(Findings, Saved):
         return PoseError(pose, locked(whole.reshape(*shape, 6, 6)), locked(own.reshape(*shape, 6, 6)))
 
     def forward(self, unstrained_length: ArrayLike, start: PoseLike | None = None) -> ForwardSolution:
-        """Pose of the platform at reported lengths, with its covariance.
+        """Forward kinematics at reported lengths: pose of the platform, and covariance of the pose.
 
         Args:
-            unstrained_length: Reported lengths [m], shape (m,) or (N, m); `length_offset` is added to them.
+            unstrained_length: Reported lengths [m], shape (m,) or (N, m); they are multiplied by `length_scale`, then
+                `length_offset` is added.
             start: Initial pose, as in `forward`.
 
         Returns:
-            ForwardSolution of the calibrated robot. Its `covariance` includes the parameters and
+            ForwardSolution of the calibrated robot, with a `covariance` that includes the errors of the parameters and
             `sensors.length_deviation`; NaN without a solution.
 
         Raises:
-            InvalidValueError: For the same reasons as `forward`.
+            InvalidValueError: In the cases in which the function `forward` raises this error.
         """
         believed = numbers(unstrained_length, "unstrained_length", "m")
-        lengths = believed if believed.shape[-1:] != self.length_offset.shape else believed + self.length_offset
+        lengths = (
+            believed
+            if believed.shape[-1:] != self.length_offset.shape
+            else self.length_scale * believed + self.length_offset
+        )
         found = forward(self.robot, lengths, start, self.model)
         rows, shape = np.atleast_2d(found.state.unstrained_length), found.pose.shape
         there = np.isfinite(rows).all(axis=1) & np.atleast_1d(found.stable)
@@ -214,18 +233,24 @@ class Calibration(Findings, Saved):
         covariance = _transformed_covariance(of_center, covariance)
         return replace(found, covariance=locked(covariance.reshape(*shape, 6, 6)))
 
+    @property
+    def length_scale(self) -> Array:
+        """Scale of reported lengths, shape (m,); 1 where it was not estimated."""
+        return values_in(self.parameters, self.values, kinds.SCALE, 1.0)
+
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
-        return motion_slopes(self.robot, self.model, self.parameters, poses, lengths)
+        reported = self.length_offset, self.length_scale
+        return motion_slopes(self.robot, self.model, self.parameters, poses, lengths, *reported)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:
-        """Covariance of origin and rotation vector (N, 6, 6) from covariances of values and winch lengths."""
+        """Covariance (N, 6, 6) of origin and rotation vector, due to errors of the values and of the winch lengths."""
         size = np.abs(by_values).max(axis=(1, 2), keepdims=True)
         by_length = by_length * self.sensors.length_deviation
         known = _transformed_covariance(by_values, self.covariance, _NEGLIGIBLE * size)
         return np.asarray(known + by_length @ np.swapaxes(by_length, 1, 2))
 
     def _common_motion(self) -> Array:
-        """Derivatives (4, P) by the values: shift and vertical rotation that are common to all poses of the log."""
+        """Derivatives (4, P) of the common shift and vertical rotation of all poses of the log by the values."""
         poses = pose_rows(self.poses)
         part = evenly_spaced(len(poses), MOST)
         by_values = self._slopes(poses[part], np.atleast_2d(self.unstrained_length)[part])[0][:, :3]
@@ -237,16 +262,16 @@ class Calibration(Findings, Saved):
     def sensor_deviations(self, *, per_cable: bool = False) -> tuple[SensorDeviation, ...]:
         """Standard deviations of the sensors from the residuals, by restricted maximum likelihood (REML).
 
-        They are estimates for `Sensors` if the model is right. A wrong model increases them.
+        If the model is right, the results can be used in `Sensors`. A wrong model increases the results.
 
         Args:
-            per_cable: True for a deviation of each length sensor and each load cell.
+            per_cable: True for a separate result for each length sensor and each load cell.
 
         Returns:
-            One deviation per kind of sensor, or per sensor; empty if lengths are the only readings.
+            One standard deviation per kind of sensor, or per sensor; empty if lengths are the only readings.
         """
         return findings.sensor_deviations(self, per_cable=flag(per_cable, "per_cable"))
 
     def table(self) -> str:
-        """Every value with its standard error, its prior and its change, one per line."""
+        """Text with one line per value: the value, its standard error, its prior and its change."""
         return summary.table(self)

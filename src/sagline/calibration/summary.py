@@ -11,24 +11,26 @@ from scipy.special import bdtrc
 
 from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier, sensor_deviations
 from sagline.calibration.identifiability import easiest_measurement
-from sagline.calibration.parameters import KINDS, Parameters, internal, is_observed, prior_root
+from sagline.calibration.parameters import KINDS, OF_FORCES, Parameters, internal, is_observed, prior_root
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
+from sagline.kernels import codes
 
 WIDTH: Final = 80
-CLEARLY: Final = 4.0  # standard deviations by which chi squared is clearly below its expected value
-FAR: Final = 4.0  # departure of a value from its prior, in prior deviations
-MANY: Final = 4  # smallest number of outliers of a faulty sensor
-CHANCE: Final = 1e-3  # probability that the outliers of equal sensors gather on one sensor
-MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further items is given
-MOST_ROWS: Final = 8  # largest number of listed rows of the log; the number of further rows is given
+CLEARLY: Final = 4.0  # standard deviations by which chi squared is below its expected value if it is too small
+FAR: Final = 4.0  # a value is far from its prior if the difference exceeds this number of prior deviations
+SEEN: Final = 0.999  # a value is observed if its standard error is below this share of its prior deviation
+MANY: Final = 4  # a sensor with fewer outliers is not reported as faulty
+CHANCE: Final = 1e-3  # a sensor is faulty if the probability that chance gives it so many outliers is below this value
+MOST_OUTLIERS: Final = 12  # largest number of listed outliers; a last line counts the other outliers
+MOST_ROWS: Final = 8  # largest number of listed rows of the log; the text counts the other rows
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
-SMALL: Final = {"m": (1e3, "mm"), "N": (1.0, "N"), "rad": (1e3, "mrad")}  # units of deviations
+SMALL: Final = {"m": (1e3, "mm"), "N": (1.0, "N"), "rad": (1e3, "mrad")}  # SI unit: factor, written unit
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
 
 def calibration_text(found: Findings, width: int = WIDTH) -> str:
-    """Text of a calibration in lines of at most `width` columns, verdict first."""
+    """Text of a calibration in lines of at most `width` characters; the verdict comes first."""
     parts = (
         _verdict(found, width),
         _rows(found, width),
@@ -46,7 +48,7 @@ def calibration_text(found: Findings, width: int = WIDTH) -> str:
 
 
 def table(found: Findings) -> str:
-    """Every value with its standard error and its prior, one per line."""
+    """Table with one value per line: the value, its standard error, its prior and its change."""
     numbers = found.parameters
     head = ("number", "found", "before", "change, in prior deviations")
     rows = [head]
@@ -62,7 +64,7 @@ def table(found: Findings) -> str:
 
 
 def outlier_text(outlier: Outlier) -> str:
-    """Text of an outlier: row of the log, cable and size."""
+    """Text of an outlier with row of the log, cable and size."""
     where = "" if outlier.cable is None else f", cable {outlier.cable}"
     size = n(outlier.size, ".3g", UNITS.get(outlier.quantity, ""))
     times = n(outlier.deviations, ".2g")
@@ -70,7 +72,7 @@ def outlier_text(outlier: Outlier) -> str:
 
 
 def row_ranges(rows: Sequence[int] | Indices) -> str:
-    """Increasing row indices as ranges: "rows 3, 17 to 19 and 5 more"."""
+    """Text of increasing row indices with ranges, such as "rows 3, 17 to 19 and 5 more"."""
     spans: list[list[int]] = []
     for row in map(int, rows):
         if spans and row == spans[-1][1] + 1:
@@ -84,28 +86,29 @@ def row_ranges(rows: Sequence[int] | Indices) -> str:
 
 
 def chi_squared_text(found: Findings) -> str:
-    """Chi squared and its expected value."""
+    """Text with chi squared and its expected value."""
     freedom = found.degrees_of_freedom
     if freedom <= 0:
         return f"chi squared {n(found.chi_squared, '.4g')} without degrees of freedom: nothing confirms the values"
     text = f"chi squared {_with_expected(found.chi_squared, freedom)}"
     whole, of_all = found.chi_squared_of_all
-    if of_all != freedom:
-        less = counted(int(np.count_nonzero(found.weights < 1.0)), "pose")
-        text += f"; with {less} of less weight, without outliers, {_with_expected(whole, of_all)}"
+    if of_all not in (freedom, 0):
+        less = int(np.count_nonzero(found.weights < 1.0))
+        which = f"with {counted(less, 'pose')} of less weight, " if less else ""
+        text += f"; {which}without outliers, {_with_expected(whole, of_all)}"
     if found.chi_squared < freedom - CLEARLY * (2.0 * freedom) ** 0.5:
         text += "; the readings are better than the stated deviations"
     return text
 
 
 def _with_expected(chi_squared: float, freedom: int) -> str:
-    """Chi squared, its expected value and the standard deviation of this value."""
+    """Text with chi squared, its expected value and its expected standard deviation."""
     spread = f"{freedom:,}{SPACE}±{SPACE}{n((2.0 * freedom) ** 0.5, '.2g')}"
     return f"{n(chi_squared, ',.0f')}, expected {spread}"
 
 
 def _verdict(found: Findings, width: int) -> Iterator[str]:
-    """Lines of the verdict, after the doubts."""
+    """Lines with the status of the calibration; reasons for doubt come first."""
     source = found.log or "the log"
     what = f"{len(found.values)} numbers of {found.robot.name} from {counted(len(found.rows), 'pose')} of {source}"
     when = f", {found.date}" if found.date else ""
@@ -165,7 +168,7 @@ def _criticisms(found: Findings, width: int) -> Iterator[str]:
 
 
 def _departures(found: Findings, width: int) -> Iterator[str]:
-    """Lines of the values that are far from the robot file, in standard deviations of the prior."""
+    """Lines of the values that differ from the robot file by more than `FAR` prior standard deviations."""
     numbers = found.parameters
     deviation = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
     off = prior_root(numbers) @ ((internal(numbers, found.values) - internal(numbers, numbers.prior)) / deviation)
@@ -182,7 +185,9 @@ def _departures(found: Findings, width: int) -> Iterator[str]:
 def _held(found: Findings, width: int) -> Iterator[str]:
     """Lines with the parameters that were not estimated."""
     observed = [name for name, kind in KINDS.items() if is_observed(kind, found.sensors, found.parameters.counted)]
-    fixed = [name for name in observed if name not in found.parameters.names]
+    without_effect = OF_FORCES if found.model.code == codes.STRAIGHT else ()
+    missing = ("pulley_radius", "dead_cable") if found.before.winches is None else ()
+    fixed = [name for name in observed if name not in (*found.parameters.names, *without_effect, *missing)]
     known = [name for name in fixed if name in found.before.tolerances]
     if known:
         yield from _wrapped(f"Not estimated, errors include the tolerance: {', '.join(known)}", width)
@@ -192,7 +197,7 @@ def _held(found: Findings, width: int) -> Iterator[str]:
 
 
 def _values(found: Findings, width: int) -> Iterator[str]:
-    """Lines with the values by kind."""
+    """Lines with the estimated values, grouped by kind of parameter."""
     yield "Values ± standard errors:"
     numbers = found.parameters
     for name in dict.fromkeys(numbers.names):
@@ -212,7 +217,7 @@ def _values(found: Findings, width: int) -> Iterator[str]:
 
 
 def _moved(found: Findings, mine: list[int]) -> str:
-    """Text of the largest change among some parameters, and its cable."""
+    """Text of the largest change among the parameters `mine`, with the index of the cable."""
     numbers = found.parameters
     moved = np.abs(found.values[mine] - numbers.prior[mine])
     units = {numbers.units[k] for k in mine}
@@ -225,7 +230,7 @@ def _moved(found: Findings, mine: list[int]) -> str:
 
 
 def _coordinates(found: Findings, name: Anchors, columns: int) -> Iterator[str]:
-    """Lines with the anchors, one per line, and their errors relative to each other."""
+    """Lines with the coordinates of anchors, one anchor per line, and the errors of distances between anchors."""
     first = KINDS[name].first
     where = found.parameters.where[first : first + 3].T.astype(np.int64)
     anchors = getattr(found.robot, name)
@@ -248,7 +253,8 @@ def _coordinates(found: Findings, name: Anchors, columns: int) -> Iterator[str]:
     covariance = anchor_covariance(found.parameters, found.covariance, name)
     if covariance is not None:
         own = relative_covariance(anchors, covariance, name).reshape(where.size, where.size)
-        error = float(np.sqrt(np.trace(own) / where.size))
+        seen = (found.standard_error < SEEN * found.parameters.prior_deviation)[where.ravel()]
+        error = float(np.sqrt(np.diagonal(own)[seen].mean())) if seen.any() else np.inf
         if np.isfinite(error):
             yield f"    relative to one another ±{SPACE}{n(error, '.2g', 'm')} per coordinate"
 
@@ -263,7 +269,7 @@ def _cell(found: Findings, k: int) -> str:
 
 
 def _in_columns(cells: list[str], columns: int) -> Iterator[str]:
-    """Cells in columns, as many as fit in a line."""
+    """Lines with texts in columns, as many columns as fit in a line."""
     width = max(map(len, cells)) + 3
     each = max((columns - 4) // width, 1)
     for start in range(0, len(cells), each):
@@ -271,7 +277,7 @@ def _in_columns(cells: list[str], columns: int) -> Iterator[str]:
 
 
 def _directions(directions: Sequence[Direction], head: str, width: int) -> Iterator[str]:
-    """Lines of directions, grouped by recommended step, with the remaining share of the prior deviation."""
+    """Lines of directions, grouped by recommended measurement, with the remaining share of the prior error."""
     if not directions:
         return
     yield from _wrapped(head, width)
@@ -283,7 +289,7 @@ def _directions(directions: Sequence[Direction], head: str, width: int) -> Itera
 
 
 def _together(directions: Sequence[Direction]) -> Iterator[str]:
-    """Names with the remaining share of the prior deviation; names that differ only in the last word are joined."""
+    """Names of directions with the remaining share of the prior error; names with equal beginnings are joined."""
     ends: dict[tuple[str, str], list[str]] = {}
     for one in directions:
         head, _, end = one.name.rpartition(" ")
@@ -293,12 +299,12 @@ def _together(directions: Sequence[Direction]) -> Iterator[str]:
 
 
 def _outliers(found: Findings, width: int) -> Iterator[str]:
-    """Lines of outliers, with the position of the platform."""
+    """Lines of outliers, each with the position of the platform."""
     if not found.outliers:
         yield "Outliers: none"
         return
     place = {int(row): k for k, row in enumerate(found.rows)}
-    less = (found.weights < 1.0).any()  # no pose has less weight with robust=False
+    less = (found.weights < 1.0).any()  # with robust=False, all poses have full weight
     yield f"Outliers, {len(found.outliers)}{'; their poses have less weight' if less else ''}:"
     single = list(found.outliers)
     for (quantity, cable), own in faulty_sensors(found).items():
@@ -317,12 +323,12 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
 
 
 def faulty_sensors(found: Findings) -> dict[tuple[str, int], list[Outlier]]:
-    """Outliers of each length sensor or load cell with more outliers than chance explains."""
+    """Outliers of faulty sensors, which are length sensors or load cells with more outliers than chance explains."""
     groups: dict[tuple[str, int], list[Outlier]] = {}
     for one in found.outliers:
         if one.cable is not None:
             groups.setdefault((one.quantity, one.cable), []).append(one)
-    share = 1.0 / (2 * found.robot.cable_count)  # of the outliers, if all sensors are equal
+    share = 1.0 / (2 * found.robot.cable_count)  # expected share of the outliers, if all sensors are equal
     count = len(found.outliers)
     return {
         name: own for name, own in groups.items() if len(own) >= MANY and bdtrc(len(own) - 1, count, share) < CHANCE
@@ -330,7 +336,7 @@ def faulty_sensors(found: Findings) -> dict[tuple[str, int], list[Outlier]]:
 
 
 def _cross_validation(found: Findings, width: int) -> Iterator[str]:
-    """Errors at poses that the calibration did not use."""
+    """Lines with the errors of predictions at poses that the calibration did not use."""
     check = found.cross_validation
     if check is None:
         return
@@ -344,7 +350,7 @@ def _cross_validation(found: Findings, width: int) -> Iterator[str]:
 
 
 def _wrapped(text: str, width: int, indent: str = "", further: str = "") -> list[str]:
-    """Lines of a wrapped sentence."""
+    """Lines of a sentence that is wrapped at `width` characters."""
     return wrap(text, width, initial_indent=indent, subsequent_indent=further or indent + "  ", break_on_hyphens=False)
 
 
@@ -353,7 +359,7 @@ _TURNS: Final = {"frame_anchors": (2,), "platform_anchors": (0, 1, 2)}  # axes o
 
 
 def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors) -> Array | None:
-    """Covariance of all frame or platform anchors [m^2], (m, 3, m, 3); zero if known; None if all are known."""
+    """Covariance (m, 3, m, 3) of the frame or platform anchors [m^2]; None if no anchor coordinate is estimated."""
     first = KINDS[which].first
     numbers = parameters.where[first : first + 3].T.reshape(-1).astype(np.int64)
     if (numbers < 0).all():
@@ -366,11 +372,11 @@ def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors)
 
 
 def without_motion(points: Array, which: Anchors) -> Array:
-    """Projection (3 m, 3 m) of small changes of anchors (m, 3) without their common rigid motion.
+    """Matrix (3 m, 3 m) that removes the common rigid motion from small changes of anchors `points` (m, 3).
 
-    The projection removes shifts and unobservable rotations. For the frame, these are rotations about the vertical. For
-    the platform, they are all rotations, because its anchors define its frame. It is an S-transformation with equal
-    weights of all anchors (Baarda 1973).
+    The matrix removes shifts and unobservable rotations: for frame anchors, the rotation about the vertical; for
+    platform anchors, all rotations, because the platform anchors define the platform frame. The method is an
+    S-transformation with equal weights of all anchors (Baarda 1973).
     """
     m = len(points)
     ways = [np.tile(axis, m) for axis in np.eye(3)]
@@ -381,7 +387,7 @@ def without_motion(points: Array, which: Anchors) -> Array:
 
 
 def relative_covariance(points: Array, covariance: Array, which: Anchors) -> Array:
-    """Covariance (m, 3, m, 3) of anchors without their common rigid motion [m^2]; NaN if a variance is infinite."""
+    """Covariance (m, 3, m, 3) [m^2] of anchors after removal of their common motion; NaN for infinite variances."""
     if not np.isfinite(covariance).all():
         return np.full(covariance.shape, np.nan)
     kept, size = without_motion(points, which), points.size

@@ -1,4 +1,4 @@
-"""Weakly identifiable parameters: combinations with little information from the readings, and correlated pairs."""
+"""Weakly identifiable parameters: combinations about which the readings contain little information."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from sagline.calibration.identifiability import easiest_measurement, measurement
 from sagline.calibration.parameters import Parameters, PriorUnits, prior_units
 from sagline.core.arrays import Array, Flags, Indices, locked
 
-LITTLE: Final = 0.5  # the readings are not informative if more than this share of the prior deviation remains
-ALIKE: Final = 0.98  # with this correlation, two parameters have five times the error of their sum or difference
-_MOST: Final = 0.8  # smallest share of the square of a direction in the named parameters
+LITTLE: Final = 0.5  # a direction is weakly identifiable if a larger share of its prior deviation remains
+ALIKE: Final = 0.98  # correlation at which two parameters have five times the error of their sum or difference
+_MOST: Final = 0.8  # the names of a direction represent at least this share of its squared length
 _NAMES: Final = 3
-_SINGULAR: Final = 1e-10  # effects are equal if they differ by less than this share of the sum of variances
+_SINGULAR: Final = 1e-10  # variances below this share of the sum of variances are rounding errors
 _TINY: Final = 1e-300
 
 
-Groups = dict[str, Indices]  # name such as "frame_anchors z", and the indices of the parameters of this kind and axis
+Groups = dict[str, Indices]  # name of a kind and axis, such as "frame_anchors z", and indices of its parameters
 
 
 def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direction, ...]) -> tuple[Direction, ...]:
     """Weakly identifiable directions, without the unobservable directions.
 
-    The first directions have more than `LITTLE` of the prior deviation left, in decreasing order. Pairs of parameters
-    with a correlation above `ALIKE` follow, and single parameters with the same effect as a combination of the
-    parameters of all cables.
+    The result begins with directions that keep more than the share `LITTLE` of the prior deviation, the largest share
+    first. Next are pairs of parameters with a correlation above `ALIKE`. The last are single parameters that change the
+    readings as a combination of parameters of all cables does.
     """
     frame = prior_units(parameters)
     complement = _complement(frame, gauge)
@@ -44,7 +44,7 @@ def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direct
 
 
 def _complement(frame: PriorUnits, gauge: tuple[Direction, ...]) -> Array:
-    """Orthonormal basis of the observable directions of the unknowns, in prior standard deviations, (P, k)."""
+    """Orthonormal basis (P, k) of the observable directions, in standard deviations of the priors."""
     count = len(frame.scale)
     fixed = np.eye(count)[:, np.setdiff1d(np.arange(count), frame.free)]
     left = np.array([one.vector / frame.units for one in gauge]).reshape(len(gauge), count).T
@@ -54,7 +54,7 @@ def _complement(frame: PriorUnits, gauge: tuple[Direction, ...]) -> Array:
 
 
 def _groups(parameters: Parameters, frame: PriorUnits) -> Groups:
-    """Parameters by kind and axis."""
+    """Indices of the parameters, grouped by kind and axis."""
     members: dict[str, list[int]] = {}
     for index in map(int, frame.free):
         axis = parameters.labels[index].rpartition(".")[2] if "." in parameters.labels[index] else ""
@@ -65,7 +65,7 @@ def _groups(parameters: Parameters, frame: PriorUnits) -> Groups:
 def _little_observed(
     triangle: Array, seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: Groups
 ) -> list[Direction]:
-    """Directions with little information; directions with equal names become one direction, with their number."""
+    """Directions about which the readings contain little information; directions with equal names are joined."""
     _, sizes, rows = np.linalg.svd(seen, full_matrices=True)
     sizes = np.concatenate((sizes, np.zeros(len(rows) - len(sizes))))
     left = 1.0 / np.hypot(1.0, sizes)
@@ -89,9 +89,9 @@ def _little_observed(
 
 
 def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices, member: Array) -> tuple[str, ...]:
-    """Names for a direction (P,), one per main kind: the parameter or axis with nearly all of its share, or the kind.
+    """Names for the direction `vector` (P,), one for each of its main kinds of parameters.
 
-    kinds: rank of each parameter's kind (P,); member: 1 if the group contains the parameter, otherwise 0, (g, P).
+    kinds: index (P,) of each parameter's kind; member: matrix (g, P) with 1 for each parameter of a group.
     """
     square = vector**2
     shares = np.bincount(kinds, square, minlength=kinds.max() + 1)
@@ -112,7 +112,7 @@ def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices
 
 
 def _substitutes(scaled: Array, index: int, groups: Groups) -> tuple[str, ...]:
-    """One or two groups without a parameter that have nearly the same effect on the readings as the parameter."""
+    """Names of one or two groups of parameters that can change the readings nearly as the parameter `index` does."""
     others = [name for name, members in groups.items() if index not in members]
     for count in (1, 2):
         best: tuple[str, ...] = ()
@@ -132,7 +132,7 @@ def _substitutes(scaled: Array, index: int, groups: Groups) -> tuple[str, ...]:
 def _correlated_pairs(
     seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: Groups
 ) -> list[Direction]:
-    """Most correlated parameters of every two groups, and single parameters with the effect of a group."""
+    """Strongly correlated pairs of parameters, and single parameters with the same effect as a group of parameters."""
     known = np.isfinite(parameters.prior_deviation)[:, None] * complement
     _, sizes, rows = np.linalg.svd(np.vstack((seen, known)), full_matrices=False)
     spread = complement @ rows.T / np.maximum(sizes, _TINY)
@@ -157,14 +157,14 @@ def _correlated_pairs(
 
 
 def _most_correlated(likeness: Array, first: Indices, second: Indices) -> tuple[int, int] | None:
-    """Most correlated parameters of two groups; None if below `ALIKE`; likeness: absolute correlations."""
+    """Most correlated pair of parameters of two groups; None below `ALIKE`; likeness: absolute correlations (P, P)."""
     block = likeness[first[:, None], second]
     row, column = divmod(int(block.argmax()), block.shape[1])
     return (int(first[row]), int(second[column])) if block[row, column] > ALIKE else None
 
 
 def _is_substituted(scatter: Array, many: Indices) -> Flags:
-    """True for parameters (P,) with a multiple correlation above `ALIKE` with the parameters `many`."""
+    """True (P,) for each parameter with a multiple correlation above `ALIKE` with the parameters `many`."""
     within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
     share = np.sum(between * np.linalg.solve(within + ridge, between), axis=0)
@@ -172,7 +172,7 @@ def _is_substituted(scatter: Array, many: Indices) -> Flags:
 
 
 def _least_known_combination(scatter: Array, members: Indices, names: tuple[str, ...], frame: PriorUnits) -> Direction:
-    """Combination of some parameters with the largest error."""
+    """Direction among the parameters `members` that has the largest error."""
     values, vectors = np.linalg.eigh(scatter[np.ix_(members, members)])
     left = float(np.sqrt(max(values[-1], 0.0)))
     vector = np.zeros(len(scatter))
@@ -183,7 +183,7 @@ def _least_known_combination(scatter: Array, members: Indices, names: tuple[str,
 def _direction(
     names: tuple[str, ...], many: str, vector: Array, left: float, frame: PriorUnits, *, alone: bool = False
 ) -> Direction:
-    """Direction with its names; if a group has the effect of a single parameter, the step measures that parameter."""
+    """Direction with a name and a recommended measurement; alone: True to measure only the first parameter."""
     vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
     step = easiest_measurement(re.split(r"[ .[]", name)[0] for name in (names[:1] if alone else names))
     name = " with ".join((names[0], " and ".join(names[1:]))) if names[1:] else names[0]

@@ -1,4 +1,4 @@
-"""Entry point of the command `sagline` and of `python -m sagline.cli`; signals are handled before other imports."""
+"""Entry point of `sagline` and `python -m sagline.cli`. It handles signals before other modules are imported."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from sagline.cli.ending import SIGNALS, exit_code_of
 
 def app_entry() -> None:
     """Run the command and end the process."""
-    for descriptor in range(3):  # otherwise an opened file would get the descriptor of a closed standard stream
+    for descriptor in range(3):  # otherwise the next opened file would get the descriptor of a closed standard stream
         try:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDONLY if descriptor == 1 else os.O_RDWR)
-            if descriptor == 1:  # a read-only replacement: writing raises an error, so no output is lost silently
+            if descriptor == 1:  # the replacement is read-only: writing raises an error
                 sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
     code = exit_code_of(lambda: _command(debug), debug=debug, last=True)
-    if code - 128 in SIGNALS:  # Python's finalization can abort in an extension whose import was interrupted
+    if code - 128 in SIGNALS:  # at its end, Python can abort in an extension module whose import was interrupted
         os._exit(code)
     sys.exit(code)
 

@@ -6,7 +6,7 @@ from collections import Counter
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -14,7 +14,7 @@ import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.output import FigureMaker, Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
-from sagline.cli.track import ConfirmedRun, run_along, run_name, tell
+from sagline.cli.track import ConfirmedRun, run_name, tell
 from sagline.core.errors import nearest
 from sagline.core.numbers import n
 
@@ -23,60 +23,53 @@ if TYPE_CHECKING:
 
 ROBOTS = ("article-suspended", "article-mixed")
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
-HULLS = ("hull-suspended", "hull-mixed")  # the article names workspaces with sag as future work
+HULLS = ("hull-suspended", "hull-mixed")  # workspaces with sag, which the article names as future work
 CELLS = (
     20  # cells along the longest edge of the frame: this takes half a second per robot, and volumes are within 0.2 %
 )
 
 
-def run(
-    folder: opt.OutOption = Path("output"),
-    figures: opt.FiguresOption = True,
-    formats: opt.FormatsOption = opt.USUAL_FORMATS,
-    style: opt.StyleOption = opt.FigureStyle.PLAIN,
-    table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
-) -> int:
-    """Run the article's test: two simulated robots, the empirical and the exact cable model, figures 18 to 22.
+def run(files: opt.Files = opt.Files()) -> int:
+    """Run the article's test with two simulated robots and two cable models (empirical, exact). Draw figures 18 to 22.
 
     The tension distribution has the least norm of the horizontal tensions T_x, as in the article's figures.
     """
     from sagline.workspaces.workspace import amount_of
 
     models = sl.Empirical(), sl.Catenary()
-    # The article's equation (55) selects the tensions closest to the previous ones. However, its figures show lower
-    # cables near their minimum tension, and curves that return to their start. Both mean the minimum norm of T_x.
+    # The article's equation (55) selects the tensions closest to the previous ones. However, in its figures,
+    # the lower cables are near their minimum tension, and the curves return to their start. Both indicate the minimum
+    # norm of T_x.
     tension = sl.MinimumNorm("horizontal")
     robots = [sl.load_robot(name) for name in ROBOTS]
     plans = [run_name(robot, model) for robot in robots for model in models]
-    files = [f"{name}.{kind}" for name in plans for kind in ("nc", *["csv"] * table)]
-    drawn = [*FIGURES, *HULLS] if figures else []
-    output = Output(folder, "", [*files, *(f"{name}.glb" for name in HULLS)], drawn, formats, style)
+    hulls = [f"{name}.glb" for name in HULLS]
+    output = Output(
+        files, "", [*(f"{name}.nc" for name in plans), *hulls], [*FIGURES, *HULLS], *(f"{name}.csv" for name in plans)
+    )
     path, runs = sl.article_path(), []
     with working("planning the article's path, and confirming it with exact cables") as line:
         for robot in robots:
-            runs += [run_along(robot, path, model, tension, line) for model in models]
+            runs += [ConfirmedRun.along(robot, path, model, tension, line) for model in models]
     with working("workspaces of both robots") as line:
         spaces = [sl.workspace(robot, cells=CELLS, progress=line.progress) for robot in robots]
     with working("writing runs, hulls and figures"):
         for name, run in zip(plans, runs, strict=True):
             run.plan.save(output.file(f"{name}.nc"))
-            if table:
-                output.table(f"{name}.csv", run.plan.table().rows)
-        if figures:
-            empirical = (run for run in runs if isinstance(run.plan.state.cables.model, sl.Empirical))
-            output.draw(*_figures(*empirical), *(partial(sl.plot.workspace, space) for space in spaces))
+            output.table(f"{name}.csv", run.plan.table)
+        empirical = (run for run in runs if isinstance(run.plan.state.cables.model, sl.Empirical))
+        output.draw(*_figures(*empirical), *(partial(sl.plot.workspace, space) for space in spaces))
         for name, space in zip(HULLS, spaces, strict=True):
             space.surface.export(output.file(f"{name}.glb"))
     notes = [f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions."]
     for space in spaces:
         name, mass = space.robot.name, space.robot.mass
         notes.append(f"The workspace of {name} in its frame is {amount_of(space)}, level, with its {mass:g} kg.")
-    return tell(runs, output, notes, as_json=as_json)
+    return tell(runs, output, notes)
 
 
 def _figures(suspended: ConfirmedRun, mixed: ConfirmedRun) -> tuple[FigureMaker, ...]:
-    """The article's figures 18 to 22, computed with the article's cable model, in the order of FIGURES."""
+    """Functions that draw the article's figures 18 to 22 with its cable model, in the order of `FIGURES`."""
     path = suspended.plan.path
     assert path is not None
     return (
@@ -89,16 +82,14 @@ def _figures(suspended: ConfirmedRun, mixed: ConfirmedRun) -> tuple[FigureMaker,
 
 
 def article(
-    parts: Annotated[
-        list[str] | None,
-        opt.argument(
-            "PART",
-            "figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, "
-            "simulation, poses, workspace, errata. Default: everything.",
-        ),
-    ] = None,
-    folder: opt.OutOption = Path("output"),
-    as_json: opt.JsonOption = False,
+    parts: list[str] | None = opt.argument(
+        None,
+        "PART",
+        "figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, simulation, "
+        "poses, workspace, errata. Default: everything.",
+    ),
+    folder: Path = opt.OUTPUT,
+    as_json: bool = opt.JSON,
 ) -> None:
     """Reproduce the article's figures, tables and errata, as one page that compares the article with computed values.
 
@@ -112,7 +103,7 @@ def article(
     """
     from sagline.article.report import NAMES, write_article
 
-    Output(folder, "", NAMES)  # `Outputs` raises an error if a file cannot be written
+    Output(opt.DataFiles(folder, table=False), "", NAMES)  # raises an error if a file cannot be written
     what = "reproducing the studies of the article"
     with working(what) as line:
 
@@ -135,19 +126,18 @@ PARTS: Final = 1000  # steps of the progress bar
 
 
 def experiment(
-    name: Annotated[str, opt.argument("NAME", "article: ten points, Table 2 and figures 25-27.")],
-    waits: Annotated[
-        bool, opt.flag("Run without real time and network, in half a minute instead of 14 minutes.", "--in-process")
-    ] = False,
-    true: opt.TrueOption = None,
-    seed: opt.SeedOption = 1,
-    folder: opt.OutOption = Path("output"),
-    write_table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
+    name: str = opt.argument(opt.NEEDED, "NAME", "article: ten points, Table 2 and figures 25-27."),
+    waits: bool = opt.flag(
+        False, "Run without real time and network, in half a minute instead of 14 minutes.", "--in-process"
+    ),
+    true: str | None = opt.TRUE,
+    seed: int = opt.seed(1),
+    files: opt.DataFiles = opt.DataFiles(),
 ) -> None:
-    """Repeat the article's experiment (home, the ten points of Table 2, home) as one page that compares the numbers.
+    """Repeat the article's experiment: home, the ten points of Table 2, home. One page compares the numbers.
 
-    The controller drives a twin of the prototype in another process, over S7 and in real time; this takes 14 minutes.
+    The controller drives a twin of the prototype, which runs in another process, over S7 and in real time. The
+    experiment takes 14 minutes.
     The page is DIR/experiment.html and needs no other file. The numbers are in DIR/experiment.json.
 
     For example:
@@ -168,40 +158,36 @@ def experiment(
     if real.cable_count != nominal.cable_count:
         step = "Begin a robot file with base: article-prototype, and give the values that differ from it."
         raise sl.InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
-    output = Output(folder, "", [*NAMES, *[TABLE] * write_table])
+    output = Output(files, "", NAMES, (), TABLE)
     how = _how(None if true is None else real.name, waits)
     with working("home, ten points, home") as line:
 
         def tell(share: float) -> None:
             line.progress(round(PARTS * share), PARTS)
 
-        result = in_process(real, nominal, seed=seed, tell=tell) if waits else apart_over_s7(real, nominal, seed, tell)
-    place = write_experiment(result, folder, how)
-    if write_table:
-        output.table(TABLE, _rows(result))
-    if as_json:
+        result = in_process(real, nominal, seed=seed, tell=tell) if waits else _apart_over_s7(real, nominal, seed, tell)
+    place = write_experiment(result, files.folder, how)
+    output.table(TABLE, lambda: _rows(result))
+    if files.as_json:
         show_json({finding.key: plain(finding.numbers) for finding in experiment_chapter(result, how).findings})
         return
     _tell(result)
     show_note("", f"The report: {place.resolve()}; its numbers: {NAMES[1]}")
 
 
-def apart_over_s7(true: sl.Robot, nominal: sl.Robot, seed: int, tell: Tell) -> Experiment:
-    """Drive a twin in another process, over S7, in real time."""
+def _apart_over_s7(true: sl.Robot, nominal: sl.Robot, seed: int, tell: Tell) -> Experiment:
+    """Run the experiment in real time with a twin of `true`, which runs in another process and is connected by S7."""
     from sagline.article.experiment import StopObserver, level_poses, with_cells
     from sagline.article.experiment import experiment as driven
     from sagline.article.ten_poses import HOME
-    from sagline.control.controller import Controller
-    from sagline.control.real_time import Pace
-    from sagline.plc.s7_link import S7Link
     from sagline.twin.server import machine_in_process
 
     with (
-        machine_in_process(with_cells(true), nominal, level_poses(HOME), seed=seed) as twin,
-        closing(S7Link(twin.addresses, nominal)) as link,
+        machine_in_process(with_cells(true), nominal, level_poses(HOME), seed=seed) as (addresses, position),
+        closing(sl.plc.S7Link(addresses, nominal)) as link,
     ):
-        watch = StopObserver(twin.position, tell)
-        return driven(Controller(nominal, link, pace=Pace(), record=watch), watch)
+        watch = StopObserver(position, tell)
+        return driven(sl.control.Controller(nominal, link, pace=sl.control.Pace(), record=watch), watch)
 
 
 def _how(true: str | None, waits: bool) -> str:
@@ -211,7 +197,7 @@ def _how(true: str | None, waits: bool) -> str:
 
 
 def _rows(result: Experiment) -> list[list[object]]:
-    """The heads of the columns, then one row per point: number, desired position and both distances."""
+    """Heads of the columns, then number, desired position, article's distance and own distance of each point."""
     table = result.table
     heads = ["point", *(f"desired {axis} [m]" for axis in "xyz"), "distance, article [m]", "distance [m]"]
     rows = zip(table.points, table.desired.tolist(), table.distance.tolist(), result.distance.tolist(), strict=True)

@@ -1,11 +1,13 @@
-"""`sagline calibrate`: the parameters of a robot from its log, or a plan of the poses to measure."""
+"""`sagline calibrate`: parameters of a robot from its log, or a plan of the poses to measure."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Any, Final, cast
 
+import numpy as np
 from rich.text import Text
 
 import sagline as sl
@@ -20,81 +22,126 @@ ROBOTS: Final = (".yaml", ".yml")
 WHOLE: Final = ".nc"
 TABLE: Final = ".csv"
 FIGURES: Final = (".png", ".svg", ".pdf")
+DEVIATIONS: Final = ("length_deviation", "tension_deviation", "position_deviation", "rotation_deviation")
+WITHOUT_PLAN: Final = opt.only_without("--plan")
 VALIDATION: Final = ("folds", "position_m", "position_before_m", "tension_n", "tension_before_n")
 
 
-class _Request(NamedTuple):
-    """Options of the fit and of the choice of poses. `deviations`: standard deviations from options, by sensor."""
+def _deviation(quantity: str, unit: str) -> float | None:
+    return opt.quantity(None, "NUMBER", f"Standard deviation of {quantity}. Default: that of the log.", unit, above=0.0)
 
-    robot: str
-    unknowns: tuple[str, ...] | None
-    deviations: dict[str, Any]
-    files: tuple[Path, ...]
-    plot: Path | None
-    style: opt.FigureStyle
 
-    def check_files(self, suffixes: tuple[str, ...]) -> None:
-        """Reject files with other suffixes, the robot's own file, and files that cannot be written."""
-        for file, allowed in [*((file, suffixes) for file in self.files), *[(self.plot, FIGURES)] * bool(self.plot)]:
-            assert file is not None
+@dataclass(frozen=True)
+class _Options:
+    """Options of the fit and of the choice of poses. A standard deviation of None means that of the log."""
+
+    columns: Path | None = opt.option(None, "FILE", "Map of columns for a LOG with other names (.yaml).", WITHOUT_PLAN)
+    rest: float | None = opt.quantity(
+        None,
+        "TIME",
+        "Average each rest of at least this time in a LOG with motion, '1 s'.",
+        "s",
+        WITHOUT_PLAN,
+        above=0.0,
+    )
+    out: list[Path] | None = opt.out(None, "none")
+    unknowns: str | None = opt.option(
+        None,
+        "NAMES",
+        "Unknown parameters, separated by commas; 'axial_stiffness*=10 %' means one common value (*; [] one per "
+        "cable) with a standard deviation of the robot's value. Default: "
+        "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass, and with load cells "
+        "load_cell_gain,load_cell_bias.",
+    )
+    also: str | None = opt.option(None, "NAMES", "Further unknowns beside the default ones: 'measuring_frame,target'.")
+    length_deviation: float | None = _deviation("a length or counted length, '0.5 mm'", "m")
+    tension_deviation: float | None = _deviation("a load cell's reading, '5 N'", "N")
+    position_deviation: float | None = _deviation("a measured coordinate, '1 mm'", "m")
+    rotation_deviation: float | None = _deviation("a measured rotation, '1 mrad'", "rad")
+    folds: int = opt.option(5, "NUMBER", "Groups of poses for the cross-validation; 0 for none.", WITHOUT_PLAN)
+    robust: bool = opt.flag(True, "Give outliers less weight.", "--robust/--no-robust", WITHOUT_PLAN)
+    model: str = opt.if_only(opt.MODEL, WITHOUT_PLAN)
+    plot: Path | None = opt.option(None, "FILE", "Figure of the fit: .png, .svg or .pdf.", WITHOUT_PLAN)
+    plan: int | None = opt.option(None, "NUMBER", "Without LOG: choose this number of poses to measure.")
+    seed: int = opt.seed(0, opt.only_with("--plan"))
+    style: opt.FigureStyle = opt.if_only(opt.STYLE, opt.only_with("--plot"))
+    table: bool = opt.if_only(opt.TABLE, WITHOUT_PLAN)
+    as_json: bool = opt.JSON
+
+    def parameters(self, robot: sl.Robot) -> list[str | sl.Unknown] | None:
+        """Unknown parameters; None for the default ones."""
+        named = ",".join(part for part in (self.unknowns or (self.also and "default"), self.also) if part)
+        return [_unknown(text.strip(), robot) for text in named.split(",")] if named else None
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """The given standard deviations, by field of `Sensors`."""
+        return {name: value for name in DEVIATIONS if (value := getattr(self, name)) is not None}
+
+    def files(self, robot: str) -> list[Path]:
+        """Files of `out`. In a folder, the names of files begin with the name of `robot`."""
+        stem = file_stem(Path(robot).stem)
+        names = ["poses.yaml"] if self.plan is not None else ["calibrated.yaml", "calibration.nc"]
+        files = []
+        for place in self.out or ():
+            files += [place] if is_file(place) else [place / f"{stem}-{name}" for name in names]
+        folder = files[0].parent if files else Path("output")
+        return files + [folder / f"{stem}-calibration.csv"] * self.table
+
+    def check_files(self, robot: str, suffixes: tuple[str, ...]) -> None:
+        """Reject files with other suffixes, the file `robot`, and files that cannot be written."""
+        plots = [] if self.plot is None else [(self.plot, FIGURES)]
+        for file, allowed in [*((file, suffixes) for file in self.files(robot)), *plots]:
             if file.suffix.lower() not in allowed:
                 kinds = ", ".join(allowed)
                 raise sl.FileError(file, f"the suffix is {file.suffix or 'missing'}; allowed: {kinds}", "Choose one.")
-            if file.resolve() == Path(self.robot).resolve():
+            if file.resolve() == Path(robot).resolve():
                 raise sl.FileError(file, "is the input robot file; its comments would be lost", "Give another name.")
             check_files(file.parent, [file.name])
 
 
-def _deviation_option(quantity: str, unit: str) -> Any:
-    return opt.quantity("NUMBER", f"Standard deviation of {quantity}. Default: that of the log.", unit, above=0.0)
+def _unknown(text: str, robot: sl.Robot) -> str | sl.Unknown:
+    """Unknown of a text such as "mass", "drum_radius*=10 %" or "length_zero[]=20 mm"."""
+    from sagline.calibration.parameters import KINDS
+    from sagline.files.quantity import in_si, plain_number
+    from sagline.robot.tolerances import value_of
+
+    name, equals, size = (part.strip() for part in text.partition("="))
+    bare = name.removesuffix("*").removesuffix("[]").rstrip()
+    shared = {"*": True, "[]": False}.get(name[len(bare) :].strip())
+    if not equals:
+        return name if shared is None else sl.Unknown(bare, shared)
+    kind, item = KINDS[sl.Unknown(bare).name], f"{bare}: deviation"
+    relative = kind.logarithmic or not kind.unit
+    share = plain_number(size.removesuffix("%").rstrip()) if size.endswith("%") and relative else None
+    if share is not None:
+        return sl.Unknown(bare, shared, share / 100.0)
+    number = cast(float, in_si(size, kind.unit, item))
+    own = value_of(robot, bare) if kind.logarithmic else None
+    if own is not None and np.ptp(own) > 0.0:
+        step = "Give it in percent, or as tolerance in the robot file."
+        raise sl.InvalidValueError(item, size, "percent, because the cables have different values", step)
+    return sl.Unknown(bare, shared, number if own is None else number / float(own.flat[0]))
 
 
 def calibrate(
-    robot: opt.RobotArgument,
-    log: Annotated[
-        Path | None,
-        opt.argument(
-            "LOG", "CSV file, one row per pose: count_0, ... or length_0, ...; load_cell_0, ...; x, y, z if measured."
-        ),
-        opt.only_without("--plan"),
-    ] = None,
-    out: Annotated[list[Path] | None, opt.out_option("none")] = None,
-    unknowns: Annotated[
-        str | None,
-        opt.option(
-            "NAMES",
-            "Unknown parameters, with commas between. Default: "
-            "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass, and with load cells "
-            "load_cell_gain,load_cell_bias.",
-        ),
-    ] = None,
-    length_deviation: Annotated[float | None, _deviation_option("a length or counted length, '0.5 mm'", "m")] = None,
-    tension_deviation: Annotated[float | None, _deviation_option("a load cell's reading, '5 N'", "N")] = None,
-    position_deviation: Annotated[float | None, _deviation_option("a measured coordinate, '1 mm'", "m")] = None,
-    rotation_deviation: Annotated[float | None, _deviation_option("a measured rotation, '1 mrad'", "rad")] = None,
-    folds: Annotated[
-        int, opt.option("NUMBER", "Groups of poses for the cross-validation; 0 for none."), opt.only_without("--plan")
-    ] = 5,
-    robust: Annotated[
-        bool, opt.flag("Give outliers less weight.", "--robust/--no-robust"), opt.only_without("--plan")
-    ] = True,
-    model: Annotated[opt.ModelOption, opt.only_without("--plan")] = opt.ModelName.CATENARY,
-    plot: Annotated[
-        Path | None, opt.option("FILE", "Figure of the fit: .png, .svg or .pdf."), opt.only_without("--plan")
-    ] = None,
-    plan: Annotated[int | None, opt.option("NUMBER", "Without LOG: choose this number of poses to measure.")] = None,
-    seed: Annotated[opt.SeedOption, opt.only_with("--plan")] = 0,
-    style: Annotated[opt.FigureStyle, opt.STYLE, opt.only_with("--plot")] = opt.FigureStyle.PLAIN,
-    write_table: Annotated[opt.TableOption, opt.only_without("--plan")] = False,
-    as_json: opt.JsonOption = False,
+    robot: str = opt.ROBOT,
+    log: Path | None = opt.argument(
+        None,
+        "LOG",
+        "CSV file, one row per pose: count_0, ... or length_0, ...; load_cell_0, ...; x, y, z if measured. Or an .npz "
+        "or .mat file.",
+        WITHOUT_PLAN,
+    ),
+    given: _Options = _Options(),
 ) -> int:
-    """Estimate anchors, zeros and cables of a robot from its own readings.
+    """Estimate anchors, zero lengths and cables of a robot from its own readings.
 
     LOG has the readings of encoders and load cells at several poses, and optionally those of a measuring system. The
-    result has the parameters with standard errors, the combinations that no reading observes, and the outliers.
-    --out writes the calibrated robot (.yaml), the whole result (.nc), or both into a folder; it can be repeated.
-    --plan chooses poses and tensions before the measurement and predicts the standard errors; --out then writes the
-    poses (.yaml). Exit code 1 if the fit did not converge or contradicts the model or the deviations.
+    result has the parameters with standard errors, the combinations of parameters that no reading observes, and the
+    outliers. --out writes the calibrated robot (.yaml), the whole result (.nc), or both into a folder; it can be
+    repeated. --plan chooses poses and tensions before the measurement and predicts the standard errors; --out then
+    writes the poses (.yaml). Exit code 1 if the fit did not converge or contradicts the model or the deviations.
 
     For example:
 
@@ -102,34 +149,13 @@ def calibrate(
         sagline calibrate winches_robot.yaml winches.csv --folds 10 --out found.nc
         sagline calibrate winches_robot.yaml --plan 40 --out poses.yaml
     """
-    names = None if unknowns is None else tuple(name.strip() for name in unknowns.split(","))
-    deviations = {
-        "length_deviation": length_deviation,
-        "tension_deviation": tension_deviation,
-        "position_deviation": position_deviation,
-        "rotation_deviation": rotation_deviation,
-    }
-    known = {name: value for name, value in deviations.items() if value is not None}
-    names_of_files = ("poses.yaml",) if plan is not None else ("calibrated.yaml", "calibration.nc")
-    files = _files(robot, out or (), names_of_files)
-    if write_table:
-        files += _files(robot, [files[0].parent if files else Path("output")], ("calibration.csv",))
-    request = _Request(robot, names, known, files, plot, style)
-    if plan is not None:
-        return _plan_poses(request, plan, seed, as_json=as_json)
-    return _fit(request, log, model.build(), folds, robust=robust, as_json=as_json)
+    return _fit(robot, log, given) if given.plan is None else _plan_poses(robot, given.plan, given)
 
 
-def _files(robot: str, out: Iterable[Path], names: Iterable[str]) -> tuple[Path, ...]:
-    """The files of `--out`; in a folder, their names are the robot's name and these endings."""
-    stem = file_stem(Path(robot).stem)
-    folders = {place: [place / f"{stem}-{name}" for name in names] for place in out if not is_file(place)}
-    return tuple(file for place in out for file in folders.get(place, [place]))
-
-
-def _fit(request: _Request, log: Path | None, model: sl.CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
-    """Calibrate, write and print the result; returns the exit code."""
+def _fit(name: str, log: Path | None, given: _Options) -> int:
+    """Calibrate, write and print the result. Returns the exit code."""
     from sagline.calibration import summary
+    from sagline.files.log_file import read_log
 
     if log is None:
         step = "Give the file of the readings, or choose poses with --plan 40."
@@ -137,14 +163,15 @@ def _fit(request: _Request, log: Path | None, model: sl.CableModel, folds: int, 
     if log.suffix.lower() in (*ROBOTS, WHOLE):
         step = "Give the file of the readings of encoders and load cells, such as winches.csv."
         raise sl.FileError(log, "is not a CSV file of readings", step)
-    request.check_files((*ROBOTS, WHOLE, TABLE))
-    robot, readings = sl.load_robot(request.robot), _log(log, request.deviations)
+    given.check_files(name, (*ROBOTS, WHOLE, TABLE))
+    robot, readings = sl.load_robot(name), read_log(log, None, given.columns, given.deviations)
+    if given.rest is not None:
+        readings = readings.at_rest(given.rest)
     with working(f"{robot.name}: calibrating from {len(readings):,} rows") as line:
-        found = sl.calibrate(
-            robot, readings, request.unknowns, model=model, robust=robust, folds=folds, progress=line.progress
-        )
-        files = _written(found, request, line)
-    if as_json:
+        how: dict[str, Any] = {"robust": given.robust, "folds": given.folds, "progress": line.progress}
+        found = sl.calibrate(robot, readings, given.parameters(robot), model=given.model, **how)
+        files = _written(found, given.files(name), given, line)
+    if given.as_json:
         show_json({**_record(found), "files": files})
     else:
         _show_lines(lambda width: summary.calibration_text(found, width))
@@ -153,49 +180,38 @@ def _fit(request: _Request, log: Path | None, model: sl.CableModel, folds: int, 
     if found.status is sl.CalibrationStatus.FOUND:
         return 0
     show_note(f"{robot.name}: ", found.status.text, style="bold red")
-    if found.status is sl.CalibrationStatus.NOT_CONVERGED and len(files) < len(request.files):
+    if found.status is sl.CalibrationStatus.NOT_CONVERGED and len(files) < len(given.files(name)):
         show_note("", "No robot file is written, because the fit did not converge.")
     return OUTSIDE
 
 
-def _plan_poses(request: _Request, count: int, seed: int, *, as_json: bool) -> int:
-    """Choose poses, write and print them; returns the exit code."""
+def _plan_poses(name: str, count: int, given: _Options) -> int:
+    """Choose `count` poses, write and print them. Returns the exit code."""
     from sagline.calibration import planning
 
-    request.check_files(ROBOTS)
-    robot = sl.load_robot(request.robot)
+    given.check_files(name, ROBOTS)
+    robot, files = sl.load_robot(name), given.files(name)
     with working(f"{robot.name}: choosing {count:,} poses") as line:
-        sensors = sl.Sensors(**request.deviations) if request.deviations else None
-        chosen = sl.calibration_poses(robot, count, request.unknowns, sensors, seed=seed, progress=line.progress)
-        for file in request.files:
+        sensors = sl.Sensors(**given.deviations) if given.deviations else None
+        how: dict[str, Any] = {"seed": given.seed, "progress": line.progress}
+        chosen = sl.calibration_poses(robot, count, given.parameters(robot), sensors, **how)
+        for file in files:
             create_folder(file.parent)
             chosen.save(file)
-    if as_json:
-        show_json({**_record_of_poses(chosen), "files": list(request.files)})
+    if given.as_json:
+        show_json({**_record_of_poses(chosen), "files": files})
         return 0
     _show_lines(lambda width: f"{planning.poses_text(chosen, width)}\n{planning.poses_table(chosen, width)}")
-    _tell_files(request.files)
+    _tell_files(files)
     return 0
 
 
-def _log(file: Path, deviations: dict[str, float]) -> sl.WinchLog:
-    """The log; deviations on the command line replace the deviations in the comments of the file."""
-    from sagline.files.log_file import sensors_of_comments
-    from sagline.files.reading import read_text
-    from sagline.files.table import TABLE_LIMIT
-
-    if not deviations:
-        return sl.load_log(file)
-    sensors, _ = sensors_of_comments(read_text(file, TABLE_LIMIT), file)
-    return sl.load_log(file, sensors.replace(**deviations))
-
-
-def _written(found: sl.Calibration, request: _Request, line: Any) -> list[Path]:
-    """Write the result, the figure and, if the fit has converged, the robot; returns the files."""
+def _written(found: sl.Calibration, wanted: list[Path], given: _Options, line: Any) -> list[Path]:
+    """Write the result and the figure, and the robot if the fit has converged. Returns the files."""
     from sagline.core.table import csv_text
 
     files = []
-    for file in request.files:
+    for file in wanted:
         create_folder(file.parent)
         if file.suffix.lower() == WHOLE:
             found.save(file)
@@ -206,18 +222,18 @@ def _written(found: sl.Calibration, request: _Request, line: Any) -> list[Path]:
         else:
             continue
         files.append(file)
-    if request.plot is not None:
+    if given.plot is not None:
         line.stage("drawing")
-        create_folder(request.plot.parent)
-        with request.style.active():
+        create_folder(given.plot.parent)
+        with given.style.active():
             figure = sl.plot.calibration(found)
-        sl.plot.save(figure, request.plot)
-        files.append(request.plot)
+        sl.plot.save(figure, given.plot)
+        files.append(given.plot)
     return files
 
 
 def _show_lines(text: Callable[[int], str]) -> None:
-    """Print a text that depends on the width of the terminal."""
+    """Print the lines of `text`, a function of the width of the terminal."""
     from sagline.calibration import summary
 
     show_pieces(lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, summary.WIDTH)).splitlines()])
@@ -229,17 +245,18 @@ def _tell_files(files: Iterable[Path]) -> None:
 
 
 def _tell_offset(found: sl.Calibration, files: list[Path]) -> None:
-    """Print the zero offsets of measured lengths as a note, because a robot file does not contain them."""
+    """Print a note about the zero offset of measured lengths, because a robot file does not contain this number."""
     robots = [file.name for file in files if file.suffix.lower() in ROBOTS]
-    if robots and found.length_offset.any():
+    if robots and (found.length_offset.any() or (found.length_scale != 1.0).any()):
         whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)
         kept = f"{whole} keeps it" if whole else "--out found.nc does"
-        text = "has no length_zero for measured lengths; add it to the lengths of the machine"
+        scaled = "multiply them by length_scale and " * bool((found.length_scale != 1.0).any())
+        text = f"has no length_zero for measured lengths; {scaled}add it to the lengths of the machine"
         show_note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
 
 
 def _rows(found: sl.Calibration) -> Iterator[Sequence[object]]:
-    """The heads of the columns, then one row per parameter: value, standard error and prior value."""
+    """Heads of the columns, then one row per parameter: value, standard error and prior value."""
     numbers = found.parameters
     yield "name", "value", "standard error", "before", "unit"
     yield from zip(numbers.labels, found.values, found.standard_error, numbers.prior, numbers.units, strict=True)

@@ -7,38 +7,34 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
+from pathlib import Path
 from socket import gethostname
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.terminal import show_note, show_text
 
 if TYPE_CHECKING:
-    from sagline.control.link import Link
     from sagline.files.mcap_writer import Recorder
-    from sagline.twin.link import Report
-    from sagline.twin.machine import Machine
-    from sagline.twin.server import Server
 
 
 def control(
-    name: opt.RobotArgument,
-    plc: Annotated[
-        str,
-        opt.option("ADDRESS,...", "Address of the PLC of each group: host, host:port or [IPv6]:port.", "--plc"),
-    ],
-    modbus: opt.ModbusOption = False,
-    shadow: Annotated[bool, opt.flag("Only read and log; send no commands.", "--shadow")] = False,
-    log: opt.LogOption = None,
-    priority: opt.PriorityOption = None,
+    name: str = opt.ROBOT,
+    plc: str = opt.option(
+        opt.NEEDED, "ADDRESS,...", "Address of the PLC of each group: host, host:port or [IPv6]:port.", "--plc"
+    ),
+    modbus: bool = opt.MODBUS,
+    shadow: bool = opt.flag(False, "Only read and log; send no commands.", "--shadow"),
+    log: Path | None = opt.LOG,
+    priority: int | None = opt.PRIORITY,
 ) -> int:
-    """Control a machine: connect, home, follow paths, until quit.
+    """Control a machine: connect, home and follow paths until the session ends.
 
     Each input line is a command: home, goto 0.2,-0.4,1.4, run path.yaml, jog 3 +5mm, pause, resume, stop, state, ack,
-    off, help. Lines from a pipe are executed one after the other; the first error ends the session. Ctrl-C stops all
-    winches and releases the machine (exit code 130). Software is not a safety function: the machine needs an emergency
-    stop that is wired in hardware.
+    off, help. Lines from a pipe are executed one after the other. The first error in such a line ends the session.
+    Ctrl-C stops all winches and releases the machine (exit code 130). Software is not a safety function: the machine
+    needs an emergency stop that is wired in hardware.
 
     For example:
 
@@ -47,12 +43,11 @@ def control(
         sagline control article-prototype --plc ... --shadow --log run.mcap
     """
     from sagline.cli.session import OperatorSession
-    from sagline.control.controller import Controller
-    from sagline.control.real_time import Pace, set_priority
+    from sagline.control.real_time import set_priority
 
     robot = sl.load_robot(name)
     if priority is not None:
-        set_priority(priority)  # before the threads of link and log start, because they inherit the priority
+        set_priority(priority)  # before the threads of `link` and `log` start, which inherit the priority
     with ExitStack() as stack:
         link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
         record = None
@@ -60,22 +55,20 @@ def control(
             from sagline.files.mcap_writer import Recorder
 
             record = stack.enter_context(Recorder(log, robot))
-        controller = Controller(robot, link, pace=Pace(), record=record, shadow=shadow)
+        controller = sl.control.Controller(robot, link, pace=sl.control.Pace(), record=record, shadow=shadow)
         gc.collect()
         gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
         session = OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow)
         return session.run()
 
 
-def _link(robot: sl.Robot, plc: str, *, modbus: bool) -> Link:
-    from sagline.plc import ModbusLink, S7Link
-
-    return ModbusLink(plc, robot) if modbus else S7Link(plc, robot)
+def _link(robot: sl.Robot, plc: str, *, modbus: bool) -> sl.control.Link:
+    return sl.plc.ModbusLink(plc, robot) if modbus else sl.plc.S7Link(plc, robot)
 
 
 LOOK: Final = 0.1  # time between two checks of the PLCs [s]
 LATE: Final = 0.05  # delay of a scan above which a message is printed [s]
-STATUS: Final = {  # the first text whose bit of `GroupStatus` is set is printed
+STATUS: Final = {  # text of the first bit of `GroupStatus` that is set
     "EMERGENCY": "emergency stop",
     "LOCKED": "drums locked",
     "BRAKED": "brakes on",
@@ -87,29 +80,28 @@ STATUS: Final = {  # the first text whose bit of `GroupStatus` is set is printed
 
 
 def twin(
-    name: opt.RobotArgument,
-    true: opt.TrueOption = None,
-    port: opt.PortOption = 11021,
-    host: opt.HostOption = "127.0.0.1",
-    modbus: opt.ModbusOption = False,
-    seed: opt.SeedOption = 0,
-    faults: Annotated[
-        list[str] | None,
-        opt.option(
-            "TEXT",
-            "A fault and its time: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; parts count from 0. "
-            "The option can be repeated.",
-            "--fault",
-        ),
-    ] = None,
-    log: opt.LogOption = None,
-    priority: opt.PriorityOption = None,
+    name: str = opt.ROBOT,
+    true: str | None = opt.TRUE,
+    port: int = opt.port(11021),
+    host: str = opt.HOST,
+    modbus: bool = opt.MODBUS,
+    seed: int = opt.seed(0),
+    faults: list[str] | None = opt.option(
+        None,
+        "TEXT",
+        "A fault and its time: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; parts count from 0. "
+        "The option can be repeated.",
+        "--fault",
+    ),
+    log: Path | None = opt.LOG,
+    priority: int | None = opt.PRIORITY,
 ) -> int:
     """Simulate plant, drives and PLCs of a robot in real time, until Ctrl-C.
 
     Each group of two winches has a simulated PLC: a server with the data blocks of a real PLC. The servers use
     consecutive ports from --port on. The PLCs have the values of ROBOT. The log has the true pose of the platform. The
-    first lines show the command that connects a controller; later lines show changes of the PLCs. Exit code 130.
+    first printed lines show the command that connects a controller. Later lines show changes of the state of the PLCs.
+    Exit code 130.
 
     For example:
 
@@ -119,8 +111,7 @@ def twin(
         sagline twin article-prototype --modbus --port 5020
     """
     from sagline.control.real_time import set_priority
-    from sagline.twin.machine import Machine
-    from sagline.twin.server import SCAN, Server, check_first_port
+    from sagline.twin.server import check_first_port
 
     robot = sl.load_robot(name)
     check_first_port(port, robot)
@@ -128,13 +119,13 @@ def twin(
     if priority is not None:
         set_priority(priority)
     with ExitStack() as stack:
-        machine = Machine(real, nominal=robot, seed=seed, period=SCAN, faults=tuple(faults or ()))
-        server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
-        watch = TwinMonitor(machine)
+        machine = sl.twin.Machine(real, nominal=robot, seed=seed, period=sl.twin.SCAN, faults=tuple(faults or ()))
+        server = stack.enter_context(closing(sl.twin.Server(machine, host=host, port=port, modbus=modbus)))
+        watch = _TwinMonitor(machine)
         if log is not None:
             from sagline.files.mcap_writer import Recorder
 
-            watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
+            watch.recorder = stack.enter_context(Recorder(log, real, period=sl.twin.SCAN))
         _greet(name, server, modbus=modbus)
         gc.collect()
         gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
@@ -146,7 +137,7 @@ def twin(
     return 0
 
 
-def _greet(name: str, server: Server, *, modbus: bool) -> None:
+def _greet(name: str, server: sl.twin.Server, *, modbus: bool) -> None:
     machine = server.machine
     winches, groups = machine.robot.cable_count, len(machine.groups)
     protocol = "Modbus TCP" if modbus else "S7"
@@ -160,11 +151,11 @@ def _greet(name: str, server: Server, *, modbus: bool) -> None:
         show_note("Note: ", "everyone who can reach this machine can drive it; there is no password.", style="bold")
 
 
-class TwinMonitor:
+class _TwinMonitor:
     """Observer that prints changes of the PLCs and records the motion of the platform."""
 
-    def __init__(self, machine: Machine) -> None:
-        """Prepare to watch a machine, beginning with its present state."""
+    def __init__(self, machine: sl.twin.Machine) -> None:
+        """Begin with the present state of `machine`."""
         self.recorder: Recorder | None = None
         self._stopped = ""
         self._machine = machine
@@ -172,7 +163,7 @@ class TwinMonitor:
         self._next = 0.0
 
     def __call__(self, time: float, reading: sl.Reading) -> None:
-        """Record the true state after the scan at `time` [s], and print all changes of the PLCs."""
+        """Record the true pose in `reading` after the scan at `time` [s], and print all changes of the PLCs."""
         if self.recorder is not None:
             self.recorder.truth(time, reading.position.copy(), reading.quaternion.copy())
         if time >= self._next:
@@ -194,8 +185,8 @@ class TwinMonitor:
             show_note("Note: ", f"the log has stopped: {self._stopped}", style="bold")
 
 
-def _doing(report: Report) -> str:
-    """Text of the state of a PLC."""
+def _doing(report: sl.twin.Report) -> str:
+    """State of a PLC as text: its status, its fault and the controller that drives it."""
     from sagline.control.link import GroupStatus, fault_text
 
     state = next((words for name, words in STATUS.items() if report.status & GroupStatus[name]), "not ready")

@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import file_of
-from sagline.cli.terminal import show_data, show_note, show_text
+from sagline.cli.output import file_of, write_or_show
+from sagline.cli.terminal import show_note, show_text
 from sagline.core.numbers import n
-from sagline.files.writing import create_folder, write_text
+from sagline.files.writing import create_folder
 
 
 class _Format(StrEnum):
@@ -29,37 +28,37 @@ ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf")}
 
 
 def convert(
-    source: Annotated[
-        str,
-        opt.argument(
-            "SOURCE", "A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset."
-        ),
-    ],
-    out: opt.FileOption = None,
-    form: Annotated[
-        _Format, opt.option("KIND", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--kind")
-    ] = _Format.ROBOT,
-    linear_density: Annotated[
-        float | None,
-        opt.quantity("QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m"),
+    source: str = opt.argument(
+        opt.NEEDED,
+        "SOURCE",
+        "A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset.",
+    ),
+    out: Path | None = opt.STDOUT,
+    form: _Format = opt.option(
+        _Format.ROBOT, "KIND", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--kind"
+    ),
+    linear_density: float | None = opt.quantity(
+        None,
+        "QUANTITY",
+        "Linear density of all cables, for instance '65 g/m'.",
+        "kg/m",
         opt.only_with("--axial-stiffness"),
-    ] = None,
-    axial_stiffness: Annotated[
-        float | None,
-        opt.quantity("QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N"),
+    ),
+    axial_stiffness: float | None = opt.quantity(
+        None,
+        "QUANTITY",
+        "Axial stiffness EA of all cables, for instance '700 kN'.",
+        "N",
         opt.only_with("--linear-density"),
-    ] = None,
-    cable_set: Annotated[
-        str | None, opt.option("NAME", "CASPR: name of the cable set. Default: that of the file.")
-    ] = None,
-    at: Annotated[
-        tuple[str, str, str] | None,
-        opt.option("X Y Z", "MuJoCo: initial position of the platform [m]. Default: middle of the test box."),
-    ] = None,
+    ),
+    cable_set: str | None = opt.option(None, "NAME", "CASPR: name of the cable set. Default: that of the file."),
+    at: tuple[str, str, str] | None = opt.option(
+        None, "X Y Z", "MuJoCo: initial position of the platform [m]. Default: middle of the test box."
+    ),
 ) -> None:
     r"""Convert a robot of CASPR or WireX to a robot file, or convert any robot to a MuJoCo model.
 
-    Assumptions, and data of the input that are lost, are printed on stderr and written into the robot file.
+    Assumptions are printed on stderr and written into the robot file, and so are the data of the input that are lost.
 
     For example:
 
@@ -90,11 +89,7 @@ def convert(
     else:
         text, straightness = _mjcf(imported.robot, place)
         imported = replace(imported, lost=(*imported.lost, straightness))
-    if out is None:
-        show_data(text)
-    else:
-        create_folder(out.parent)
-        write_text(out, text)
+    write_or_show(text, out)
     _report(imported, out)
 
 
@@ -116,7 +111,7 @@ def _material(density: float | None, stiffness: float | None) -> sl.Cable | None
 
 
 def _mjcf(robot: sl.Robot, at: list[float] | None) -> tuple[str, str]:
-    """The MuJoCo model of `robot`, and its position error, which results from tendons without sag and weight."""
+    """The MuJoCo model of `robot`, and a sentence on the position error that tendons without sag and weight cause."""
     if at is None and robot.test_box is None:
         raise sl.InvalidValueError("--at", "missing", "X Y Z in m", "Give the initial position of the platform.")
     position = at if at is not None else 0.5 * (robot.test_box.low + robot.test_box.high)  # type: ignore[union-attr]
@@ -142,19 +137,16 @@ def _report(imported: sl.Imported, out: Path | None) -> None:
 
 
 def export_c(
-    robot: opt.RobotArgument,
-    out: opt.OutOption = Path("sagline.c"),
-    tension: Annotated[
-        list[opt.Tension] | None,
-        opt.choice("METHOD", "Tension distribution method", opt.Tension),
-    ] = None,
-    variable: opt.VariableOption = opt.TensionVariable.CHORD,
-    forward: Annotated[bool, opt.flag("Write the forward kinematics too.", "--forward")] = False,
-    single_precision: Annotated[
-        bool, opt.flag("Single precision, for controllers without double precision in hardware.", "--float")
-    ] = False,
+    robot: str = opt.ROBOT,
+    out: Path = opt.out(Path("sagline.c")),
+    tension: list[str] | None = opt.one_of(None, "METHOD", "Tension distribution method", opt.TENSIONS),
+    variable: opt.TensionVariable = opt.VARIABLE,
+    forward: bool = opt.flag(False, "Write the forward kinematics too.", "--forward"),
+    single_precision: bool = opt.flag(
+        False, "Single precision, for controllers without double precision in hardware.", "--float"
+    ),
 ) -> None:
-    """Write C99 source of a robot's kinematics for a microcontroller, and SCL source of a cable's length for a PLC.
+    """Write the kinematics of a robot as C99 source for a microcontroller, and cable lengths as SCL source for a PLC.
 
     The source has the kernels of sagline, including pulleys. They compute the tensions and lengths of a pose and, with
     --forward, the pose of given lengths. The source needs no heap, and every call returns a status. The header and the
@@ -166,9 +158,12 @@ def export_c(
         sagline export-c own_robot.yaml --out robot.c --float --forward
         sagline export-c cogiro --tension minimum-norm --tension centroid
     """
+    from sagline.robot.batch import refuse_slanted
+
     loaded = sl.load_robot(robot)
-    methods = [each.build(variable) for each in tension or [opt.Tension.CLOSEST]]
+    methods = [opt.tension_named(each, variable) for each in tension or ["closest"]]
     target = file_of(out, "sagline.c")
+    refuse_slanted(loaded)  # before the folder exists
     create_folder(target.parent)
     source, header, scl = sl.export_c(
         loaded, target, tension=methods, forward=forward, single_precision=single_precision
@@ -180,11 +175,8 @@ def export_c(
     show_text(f"{scl}: P3 in SCL for a Siemens PLC, not compiled yet", whole=True)
 
 
-def export_scl(
-    robot: opt.RobotArgument,
-    out: opt.OutOption = Path("plc.scl"),
-) -> None:
-    """Write SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits, and the program of one group.
+def export_scl(robot: str = opt.ROBOT, out: Path = opt.out(Path("plc.scl"))) -> None:
+    """Write SCL source for the PLCs of a robot: data blocks, limits, and the program of one group, for TIA Portal.
 
     The program accepts commands of one controller at a time. It enforces the limits, and slows the winches down when
     commands are missing. It has not been compiled yet; the comment at its head lists the settings of the CPU.

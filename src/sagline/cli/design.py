@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
 import sagline as sl
 from sagline.cli import options as opt
@@ -15,22 +16,25 @@ FIGURE: Final = "front"
 MOST_ROWS: Final = 12  # largest number of printed robots; front.csv lists all of them
 
 
-def design(
-    robot: opt.RobotArgument,
-    file: Annotated[Path, opt.argument("DESIGN", "File with design variables, their bounds and goals, design.yaml.")],
-    out: opt.OutOption = Path("front"),
-    evaluations: Annotated[
-        str | None, opt.option("NUMBER", "Number of robots to evaluate. Default: the number in the file.")
-    ] = None,
-    figures: opt.FiguresOption = True,
-    formats: opt.FormatsOption = opt.USUAL_FORMATS,
-    style: opt.StyleOption = opt.FigureStyle.PLAIN,
-    as_json: opt.JsonOption = False,
-) -> None:
-    r"""Search for a better robot; a file states the design variables (anchors, cables, limits) and the goals.
+@dataclass(frozen=True)
+class _Files(opt.Files):
+    folder: Path = opt.out(Path("front"))
+    table: bool = False
 
-    The best robots are written as robot files, and front.csv lists them. The folder receives every robot as soon as it
-    is evaluated. Therefore the same command continues the search after Ctrl-C, or with more --evaluations.
+
+def design(
+    robot: str = opt.ROBOT,
+    file: Path = opt.argument(opt.NEEDED, "DESIGN", "File with design variables, bounds and goals (design.yaml)."),
+    evaluations: str | None = opt.option(
+        None, "NUMBER", "Number of robots to evaluate. Default: the number in the file."
+    ),
+    files: _Files = _Files(),
+) -> None:
+    r"""Search for a better robot. A file states the design variables (anchors, cables, limits) and the goals.
+
+    The best robots are written as robot files, and front.csv lists these robots. Every robot is written to the folder
+    as soon as it is evaluated. Therefore the same command continues the search after Ctrl-C, or with more
+    --evaluations.
 
     For example:
 
@@ -44,7 +48,7 @@ def design(
     first, request = sl.load_robot(robot), sl.load_design(file)
     if evaluations is not None:
         request["evaluations"] = opt.whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
-    output = Output(out, "", [FRONT], [FIGURE] * figures, formats, style)
+    output = Output(files, "", [FRONT], [FIGURE])
     rated = [0]
     with working(f"{first.name}: evaluating robots") as line:
 
@@ -53,20 +57,19 @@ def design(
             line.progress(done, total)
 
         try:
-            create_folder(out.absolute().parent)
-            front = sl.design(first, **request, folder=out, progress=show_progress)
+            create_folder(files.folder.absolute().parent)
+            front = sl.design(first, **request, folder=files.folder, progress=show_progress)
         except KeyboardInterrupt:
-            show_note("", f"{rated[0]:,} evaluated robots are in {out}: the same command continues.")
+            show_note("", f"{rated[0]:,} evaluated robots are in {files.folder}: the same command continues.")
             raise
-        output.files = front.save(out)
-        if figures:
-            line.stage("drawing")
-            output.draw(lambda: sl.plot.front(front))
-    output.report(lambda: _record(front), front.text, lambda: show_table(_table(front)), as_json=as_json)
+        output.files = front.save(files.folder)
+        line.stage("drawing")
+        output.draw(lambda: sl.plot.front(front))
+    output.report(lambda: _record(front), front.text, lambda: show_table(_table(front)))
 
 
 def _table(front: sl.Front) -> TextTable:
-    """The first robot and the best robots: goals, then the design variables."""
+    """Table of the first robot and the best robots: values of the goals, then values of the design variables."""
     heads = ["", *(f"{goal.kind}\n[{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
     heads += [f"{part.name}\n[{part.unit}]" if part.unit else part.name for part in front.parts]
     rows = [[front.start.name, *_cells(front.start_values), *_cells([part.start for part in front.parts])]]
@@ -75,7 +78,7 @@ def _table(front: sl.Front) -> TextTable:
 
 
 def _better(front: sl.Front) -> list[tuple[str, Any, Any]]:
-    """Name, goals and design variables of each robot that is better than the first one."""
+    """For each robot that is better than the first one: name, values of the goals, values of the design variables."""
     names = [robot.name for robot in front.robots]
     return list(zip(names, front.values, front.changed, strict=True)) if front.better else []
 

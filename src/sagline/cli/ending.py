@@ -26,12 +26,12 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
     Args:
         command: The work; returns the exit code, None for 0.
         debug: True if the traceback of an error is printed before its message.
-        last: True if the process ends after the command; then Ctrl-C has no effect during the ending.
+        last: True if the process ends after the command. Ctrl-C then has no effect while the process ends.
 
     Returns:
-        The exit code: BAD_INPUT for an error of sagline or the system; UNEXPECTED for a mistake in the program;
-        INTERRUPTED for Ctrl-C, even if Python lost the interrupt; 143 and 129 for SIGTERM and SIGHUP; CUT_OFF if
-        the reader of the output has closed the pipe.
+        The exit code of the command. For an error, the code is BAD_INPUT if sagline or the system raised it, and
+        UNEXPECTED for a mistake in the program. The code is INTERRUPTED for Ctrl-C, even if Python lost the interrupt,
+        143 for SIGTERM, 129 for SIGHUP, and CUT_OFF if the reader of the output has closed the pipe.
     """
     interrupts = _Interrupts()
     code = UNEXPECTED
@@ -40,7 +40,7 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
             code = _finished(command)
         finally:
             interrupts.ignore()
-    except BaseException as error:  # an interrupt can occur in the line above
+    except BaseException as error:  # a signal can arrive in the line above
         interrupts.ignore()
         if not interrupts.received:
             code = _report(error, debug)
@@ -90,7 +90,7 @@ def _report(error: BaseException, debug: bool) -> int:
 
 
 def _message(error: BaseException) -> tuple[str, str, int]:
-    """Heading, text and exit code."""
+    """Heading, text and exit code of `error`."""
     from typer import Abort
 
     from sagline.core.errors import HEAD, SaglineError, shortened
@@ -133,7 +133,7 @@ def _usage(error: BaseException) -> str:
 
 def _interrupted(number: int) -> int:
     _give_up_unwritable()
-    # clears an interrupt inside another exec, after which Python would end itself by the signal
+    # clears an interrupt that occurred inside another exec; otherwise Python would end itself by the signal
     exec("")
     with suppress(OSError, ValueError, AttributeError):  # plain text, because the output library may be partly loaded
         sys.stderr.write("Interrupted. All written files are complete.\n")
@@ -154,9 +154,9 @@ def _give_up_unwritable() -> None:
 
 
 class _Interrupts:
-    """Handler of Ctrl-C, SIGTERM and SIGHUP in the main thread; signals that the process ignores stay ignored.
+    """Handler of Ctrl-C, SIGTERM and SIGHUP in the main thread. A signal that the process ignores stays ignored.
 
-    SIGTERM and SIGHUP have the same effect as Ctrl-C: a controller, for instance, stops its robot before it ends.
+    SIGTERM and SIGHUP have the same effect as Ctrl-C. A controller, for instance, stops its robot before it ends.
     """
 
     def __init__(self) -> None:
@@ -180,7 +180,7 @@ class _Interrupts:
         pressed(signal.SIGINT, frame)
 
     def ignore(self) -> None:
-        """Ignore these signals from now on."""
+        """Ignore the handled signals from now on."""
         for number in self._before:
             signal.signal(number, signal.SIG_IGN)
 

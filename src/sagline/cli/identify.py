@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -32,23 +32,20 @@ TOLERANCE = 5e-3  # position error that the printed range keeps [m]; the article
 
 
 def identify(
-    file: Annotated[Path, opt.argument("CSV", "Columns span, rise, length, tension. Units in the heads: span [mm].")],
-    length_error: Annotated[
-        float, opt.quantity("LENGTH", "Standard error of a measured length, 0.002 or '2 mm'.", "m", above=0.0)
-    ] = 0.001,
-    tension_error: Annotated[
-        float, opt.quantity("FORCE", "Standard error of a measured tension, 5 or '5 N'.", "N", above=0.0)
-    ] = 1,
-    tension_at: Annotated[
-        _TensionPlace, opt.choice("PLACE", "Place of the tension measurement", _TensionPlace)
-    ] = _TensionPlace.FRAME_END,
-    offset: Annotated[
-        bool,
-        opt.flag("Estimate the zero offset of the measured lengths as a further parameter.", "--offset/--no-offset"),
-    ] = False,
-    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
-    write_table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
+    file: Path = opt.argument(opt.NEEDED, "CSV", "Columns span, rise, length, tension. Units in the heads: span [mm]."),
+    length_error: float = opt.quantity(
+        0.001, "LENGTH", "Standard error of a measured length, 0.002 or '2 mm'.", "m", above=0.0
+    ),
+    tension_error: float = opt.quantity(
+        1, "FORCE", "Standard error of a measured tension, 5 or '5 N'.", "N", above=0.0
+    ),
+    tension_at: _TensionPlace = opt.choice(
+        _TensionPlace.FRAME_END, "PLACE", "Place of the tension measurement", _TensionPlace
+    ),
+    offset: bool = opt.flag(
+        False, "Estimate the zero offset of the measured lengths as a further parameter.", "--offset/--no-offset"
+    ),
+    files: opt.TableFiles = opt.TableFiles(),
 ) -> None:
     """Estimate the linear density, the axial stiffness and the empirical model of a measured cable.
 
@@ -61,7 +58,7 @@ def identify(
     """
     from sagline.article.identify_cable import UNITS
 
-    output = Output(folder, file.stem, [TABLE] * write_table)
+    output = Output(files, file.stem, (), (), TABLE)
     data = sl.load_measurements(file)
     with working(f"{file.name}: identifying"):
         cable = sl.identify_cable(
@@ -78,9 +75,8 @@ def identify(
     ]
     for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
         rows.append((name, estimate.value, estimate.high - estimate.value, unit))
-    if write_table:
-        output.table(TABLE, [("name", "value", "standard error", "unit"), *rows])
-    if as_json:
+    output.table(TABLE, lambda: [("name", "value", "standard error", "unit"), *rows])
+    if files.as_json:
         show_json(_record(cable, model))
         return
     texts = [[name, number_text(value, ".5g"), number_text(error, ".2g"), unit] for name, value, error, unit in rows]

@@ -8,7 +8,6 @@ from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
 
 import sagline as sl
 from sagline.cli import options as opt
@@ -21,11 +20,8 @@ from sagline.files.writing import atomic_file, create_folder
 KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 
 
-def examples(
-    folder: opt.OutOption = Path("sagline-examples"),
-    force: opt.ForceOption = False,
-) -> None:
-    """Write the files that the commands of the documentation use: a robot, a path, lengths, measurements and scripts.
+def examples(folder: Path = opt.out(Path("sagline-examples")), force: bool = opt.FORCE) -> None:
+    """Write the files that the examples of the documentation use: a robot, a path, lengths, measurements and scripts.
 
     For example:
 
@@ -33,9 +29,10 @@ def examples(
         cd DIR
         sagline track own_robot.yaml own_path.yaml
     """
-    sources = example_files()
-    Output(folder, "", [file.name for file in sources])  # `Outputs` raises an error if a file cannot be written
-    existing = [file.name for file in sources if (folder / file.name).exists()]
+    sources = _example_files()
+    names = [file.name for file in sources]
+    Output(opt.DataFiles(folder, table=False), "", names)  # raises an error if a file cannot be written
+    existing = [name for name in names if (folder / name).exists()]
     if existing and not force:
         raise sl.FileError(
             folder / existing[0], "exists", "Choose another folder with --out, or replace it with --force."
@@ -44,22 +41,19 @@ def examples(
     for file in sources:
         with atomic_file(folder / file.name) as partial:
             shutil.copyfile(file, partial)
-    show_text(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}", whole=True)
+    show_text(f"In {folder.resolve()}: {', '.join(names)}", whole=True)
     show_text(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml", whole=True)
 
 
-def example_files() -> list[Path]:
-    """Folder of the example files: next to the installed modules, or next to the docs in the source tree."""
+def _example_files() -> list[Path]:
+    """Example files, which are next to the installed modules, or next to `docs` in the source tree."""
     inside = Path(str(files("sagline"))) / "examples"
     folder = inside if inside.is_dir() else Path(__file__).parents[3] / "examples"
     return sorted(file for file in folder.glob("*") if file.suffix in KINDS)
 
 
-def cache(
-    clear: Annotated[bool, opt.flag("Remove the files.", "--clear")] = False,
-    as_json: opt.JsonOption = False,
-) -> int:
-    """Show and check the folder with the kernels that numba has compiled, or remove its files.
+def cache(clear: bool = opt.flag(False, "Remove the files.", "--clear"), as_json: bool = opt.JSON) -> int:
+    """Show and check the folder of the kernels that numba has compiled, or remove the files in this folder.
 
     The folder is used if SAGLINE_BACKEND is numba, or if the installation has no compiled library. Damaged files are
     never used, and the next run replaces them. Exit code 1 if there are damaged files.
@@ -90,7 +84,7 @@ def cache(
 
 
 def _is_whole(file: Path) -> bool:
-    """True if a file's content agrees with its digest; False for damaged and for unfinished files."""
+    """True if the content of `file` agrees with its digest. False for damaged and unfinished files."""
     from sagline.kernels.sources import SUFFIX, is_whole
 
     try:
@@ -100,13 +94,13 @@ def _is_whole(file: Path) -> bool:
 
 
 def _is_writable(folder: Path) -> bool:
-    """True if files can be written to a folder, or if the folder can be created."""
+    """True if files can be written to `folder`, or if `folder` can be created."""
     nearest = next(place for place in (folder, *folder.parents) if place.exists())
     return nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)
 
 
 def _remove(files: list[Path]) -> None:
-    """Remove files, and the folders that are empty afterwards."""
+    """Remove `files`, and their folders if these are then empty."""
     for file in files:
         try:
             file.unlink(missing_ok=True)

@@ -1,23 +1,21 @@
-"""`sagline lengths`, `encoder` and `forward`: lengths and counts of a run, and poses from lengths or counts."""
+"""`sagline lengths`, `encoder` and `forward`: lengths or counts of a run, and poses from lengths or counts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Any
 
 import numpy as np
 
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Output, TextTable, file_of, number_text, show_table
-from sagline.cli.terminal import show_data, show_json, show_note, show_text, working
-from sagline.files.writing import create_folder, file_stem, write_text
-
-if TYPE_CHECKING:
-    from sagline.core.arrays import Array
+from sagline.cli.output import Output, TextTable, file_of, number_text, show_table, write_or_show
+from sagline.cli.terminal import show_json, show_note, show_text, working
+from sagline.core.arrays import Array
+from sagline.files.writing import file_stem
 
 
 class _Winding(StrEnum):
@@ -27,16 +25,14 @@ class _Winding(StrEnum):
     REMEMBERED = "remembered"
 
 
-RunArgument = Annotated[Path, opt.argument("RUN.nc", "A run written by sagline track.")]
+RUN = opt.argument(opt.NEEDED, "RUN.nc", "A run written by sagline track.")
 
 
-def lengths(
-    file: RunArgument,
-    out: opt.FileOption = None,
-) -> int:
-    """Write the planned lengths of a run as CSV, one row per sample; `sagline forward` and controllers read the file.
+def lengths(file: Path = RUN, out: Path | None = opt.STDOUT) -> int:
+    """Write the planned lengths of a run as CSV, one row per sample, for `sagline forward` and controllers.
 
-    Only feasible samples are written. If others exist, their number is printed on stderr, and the exit code is 1.
+    Only feasible samples are written. If the run has other samples, their number is printed on stderr, and the exit
+    code is 1.
 
     For example:
 
@@ -44,20 +40,18 @@ def lengths(
     """
     out = out if out is None else file_of(out, f"{file.stem}-lengths.csv")
     plan = _plan_of(file, out)
-    return write_rows(plan, "L{} [m]", np.atleast_2d(plan.unstrained_length).tolist(), out)
+    return _write_rows(plan, "L{} [m]", np.atleast_2d(plan.unstrained_length).tolist(), out)
 
 
 def encoder(
-    file: RunArgument,
-    winding: Annotated[
-        _Winding,
-        opt.option(
-            "WINDING",
-            "Tension of the cable on the drums. constant: winding_tension of the winches; remembered: the "
-            "tension at the time when the path wound the cable.",
-        ),
-    ] = _Winding.CONSTANT,
-    out: opt.FileOption = None,
+    file: Path = RUN,
+    winding: _Winding = opt.option(
+        _Winding.CONSTANT,
+        "WINDING",
+        "Tension of the cable on the drums. constant: winding_tension of the winches; remembered: the tension at the "
+        "time when the path wound the cable.",
+    ),
+    out: Path | None = opt.STDOUT,
 ) -> int:
     """Write the encoder counts of a run as CSV, one row per sample, for the drives.
 
@@ -73,7 +67,7 @@ def encoder(
     plan = _plan_of(file, out)
     counts = np.atleast_2d(sl.encoder_counts(plan, winding.value))
     whole = [[int(count) if count == count else count for count in row] for row in counts.tolist()]
-    code = write_rows(plan, "C{}", whole, out)
+    code = _write_rows(plan, "C{}", whole, out)
     winches = plan.state.one_robot.winches
     if plan.path is None or winches is None or (winches.speed_limit is None and winches.torque_limit is None):
         return code
@@ -88,8 +82,8 @@ def encoder(
     return OUTSIDE if rates.exceeding.any() else code
 
 
-def write_rows(plan: sl.Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
-    """Write `rows` of solved samples, each with its time; returns the exit code. `name` formats a column's head."""
+def _write_rows(plan: sl.Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
+    """Write `rows` of solved samples with their times. `name` formats the head of a column. Returns the exit code."""
     from sagline.core.table import csv_text
 
     kept = np.atleast_1d(plan.solved)
@@ -100,11 +94,7 @@ def write_rows(plan: sl.Plan, name: str, rows: Sequence[Sequence[float]], out: P
     else:
         time = plan.path.time[kept].tolist()
         text = csv_text([["time [s]", *header], *([t, *row] for t, row in zip(time, body, strict=True))])
-    if out is None:
-        show_data(text)
-    else:
-        create_folder(out.parent)
-        write_text(out, text)
+    write_or_show(text, out)
     if kept.all():
         return 0
     show_note(
@@ -116,7 +106,7 @@ def write_rows(plan: sl.Plan, name: str, rows: Sequence[Sequence[float]], out: P
 
 
 def _plan_of(file: Path, out: Path | None) -> sl.Plan:
-    """The plan in the file of a run. FileError if no sample is feasible, or if the output would replace this file."""
+    """The plan in `file`. FileError if no sample is feasible, or if `out` is the same file."""
     if out is not None and out.exists() and out.resolve() == file.resolve():
         raise sl.FileError(out, "is the run itself", "Name another file with --out.")
     plan = sl.load_plan(file)
@@ -125,26 +115,23 @@ def _plan_of(file: Path, out: Path | None) -> sl.Plan:
     return plan
 
 
-SHOWN = 12  # largest number of printed rows; the file has all rows
+SHOWN = 12  # largest number of printed rows; the CSV file has all rows
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
 Cell = float | str
 
 
 def forward(
-    name: opt.RobotArgument,
-    file: Annotated[
-        Path,
-        opt.argument("CSV", "Columns length_0, length_1, ... and optionally time. Units in the heads: length_0 [mm]."),
-    ],
-    counts: Annotated[
-        bool, opt.flag("The columns are count_0, count_1, ..., the encoder counts of the robot's winches.", "--counts")
-    ] = False,
-    model: opt.ModelOption = opt.ModelName.CATENARY,
-    wrench: opt.WrenchOption = None,
-    payload: opt.PayloadOption = None,
-    folder: opt.OutOption = Path("output"),
-    write_table: opt.TableOption = True,
-    as_json: opt.JsonOption = False,
+    name: str = opt.ROBOT,
+    file: Path = opt.argument(
+        opt.NEEDED, "CSV", "Columns length_0, length_1, ... and optionally time. Units in the heads: length_0 [mm]."
+    ),
+    counts: bool = opt.flag(
+        False, "The columns are count_0, count_1, ..., the encoder counts of the robot's winches.", "--counts"
+    ),
+    model: str = opt.MODEL,
+    wrench: Any = opt.WRENCH,
+    payload: float | None = opt.PAYLOAD,
+    files: opt.DataFiles = opt.DataFiles(table=True),
 ) -> int:
     """Find the poses of the platform from measured cable lengths.
 
@@ -164,18 +151,17 @@ def forward(
     if counts:
         lengths = sl.lengths_from_counts(robot, lengths)
     table = "-poses.csv"
-    output = Output(folder, file_stem(robot.name), [table] * write_table)
+    output = Output(files, file_stem(robot.name), (), (), table)
     with working(f"{robot.name}: finding {len(lengths):,} poses") as line:
-        first = sl.forward(robot, lengths[0], model=model.build(), wrench=wrench)
+        first = sl.forward(robot, lengths[0], model=model, wrench=wrench)
         start = first.pose if np.isfinite(first.pose.position).all() else None
-        found = sl.forward(robot, lengths, start, model.build(), wrench, progress=line.progress)
+        found = sl.forward(robot, lengths, start, model, wrench, progress=line.progress)
     rows = _rows(times, found)
-    if write_table:
-        output.table(table, rows)
+    output.table(table, lambda: rows)
     lost = [
         k for k, status in enumerate(found.status) if status not in (sl.ForwardStatus.SOLVED, sl.ForwardStatus.FITTED)
     ]
-    if as_json:
+    if files.as_json:
         header = [str(cell).split(" ")[0] for cell in rows[0]]
         file_of_poses = output.files[0] if output.files else None
         show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": file_of_poses})
@@ -196,7 +182,7 @@ def forward(
 
 
 def _rows(times: Array | None, found: sl.ForwardSolution) -> list[list[Cell]]:
-    """The header, then one row per sample; rows have the time if the input file has it."""
+    """Heads of the columns, then one row per sample. The first column has `times`, if the input file has them."""
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}
     numbers = np.hstack((found.pose.position, found.pose.quaternion, found.wrench_residual)).tolist()
     words = [sl.ForwardStatus(int(code)).name for code in found.status]
@@ -208,7 +194,7 @@ def _rows(times: Array | None, found: sl.ForwardSolution) -> list[list[Cell]]:
 
 
 def _grid(rows: list[list[Cell]]) -> TextTable:
-    """The first samples; each row begins with its time or number."""
+    """Table of the first samples. Each row begins with the time or the number of the sample."""
     header, body = [str(name) for name in rows[0]], rows[1 : SHOWN + 1]
     texts = [[cell if isinstance(cell, str) else number_text(cell, ".6g") for cell in row] for row in body]
     if not header[0].startswith("time"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,13 +12,9 @@ import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_json, show_text, working
+from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import check_file
-
-if TYPE_CHECKING:
-    from sagline.control.execution import Execution
-    from sagline.control.recording import Event
-    from sagline.core.arrays import Array
 
 TABLE: Final = "-cycles.csv"
 MOST_EVENTS: Final = 20  # largest number of listed events
@@ -30,24 +26,19 @@ BAR: Final = 30  # length of the longest bar of the histogram, in characters
 
 
 def log(
-    file: Annotated[Path, opt.argument("RUN.mcap", "A log of the controller, also of a controller that was killed.")],
-    to: Annotated[
-        Path | None,
-        opt.option(
-            "FILE",
-            "Write a file instead of printing: .nc is a data set with the plan; .mcap is a complete log.",
-            "--to",
-        ),
-    ] = None,
-    plan: Annotated[
-        str | None,
-        opt.option("NUMBER", "Only the cycles of this plan; numbers start at 0. Default: all cycles.", "--plan-number"),
-    ] = None,
-    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
-    write_table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
+    file: Path = opt.argument(opt.NEEDED, "RUN.mcap", "A log of the controller, also of a controller that was killed."),
+    to: Path | None = opt.option(
+        None,
+        "FILE",
+        "Write a file instead of printing: .nc is a data set with the plan; .mcap is a complete log.",
+        "--to",
+    ),
+    plan: str | None = opt.option(
+        None, "NUMBER", "Only the cycles of this plan; numbers start at 0. Default: all cycles.", "--plan-number"
+    ),
+    files: opt.TableFiles = opt.TableFiles(),
 ) -> int:
-    """Print the contents of a log of the controller: states, largest errors, late cycles, events.
+    """Print a log of the controller: states, largest errors, late cycles and events.
 
     For example:
 
@@ -60,26 +51,25 @@ def log(
     which = None if plan is None else opt.whole_of(plan, "--plan-number", 0, MOST_PLANS)
     if to is not None:
         check_file(to)
-    output = Output(folder, file.stem, [TABLE] * write_table)
+    output = Output(files, file.stem, (), (), TABLE)
     with working(f"reading {file.name}"):
         done = sl.load_execution(file, which)
     if to is not None:
         with working(f"writing {to.name}"):
             save(done, to)
-    if write_table:
-        output.table(TABLE, done.table().rows)
-    if as_json:
+    output.table(TABLE, done.table)
+    if files.as_json:
         show_json(_record(done, to))
     elif to is not None:
         show_text(f"{to}: {len(done):,} cycles of {done.robot.name}", whole=True)
     else:
         _tell(done)
-    if not as_json:
+    if not files.as_json:
         output.show()
     return 0
 
 
-def _tell(done: Execution) -> None:
+def _tell(done: sl.control.Execution) -> None:
     duration = _since(done, done.time[-1]) if len(done) else 0.0
     silent = int(np.count_nonzero(~done.answered))
     show_text(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} without a response.")
@@ -98,35 +88,31 @@ def _tell(done: Execution) -> None:
         show_text(f"… and {len(done.events) - MOST_EVENTS:,} more events: --to FILE.nc has all of them.")
 
 
-def _since(done: Execution, time: float) -> float:
+def _since(done: sl.control.Execution, time: float) -> float:
     return float(time - done.time[0])
 
 
-def _row(done: Execution, event: Event) -> list[str]:
+def _row(done: sl.control.Execution, event: sl.control.Event) -> list[str]:
     return [f"{_since(done, event.time):.2f}", f"{event.kind} {event.name}", event.text]
 
 
-def _states(done: Execution) -> list[list[str]]:
+def _states(done: sl.control.Execution) -> list[list[str]]:
     """Time and number of cycles in each state of the controller."""
-    from sagline.control.states import State
-
     codes, counts = np.unique(done.state, return_counts=True)
     return [
-        [State(code).name, f"{count * done.period:.2f}", f"{count:,}"]
+        [sl.control.State(code).name, f"{count * done.period:.2f}", f"{count:,}"]
         for code, count in zip(codes.tolist(), counts.tolist(), strict=True)
     ]
 
 
-def _extremes(done: Execution) -> list[tuple[str, float, str, float, int | None]]:
-    """The largest errors: name, value, unit, time [s] and cable; the cable is None for errors of the platform."""
-    from sagline.control.execution import position_error
-
+def _extremes(done: sl.control.Execution) -> list[tuple[str, float, str, float, int | None]]:
+    """Name, value, unit, time [s] and cable of each largest error. The cable is None for errors of the platform."""
     errors: list[tuple[str, Array, str]] = [
         ("tension error", done.tension - done.planned_tension, "N"),
         ("tension", done.tension, "N"),
         ("length error", 1e3 * (done.set_length - done.length), "mm"),
         ("correction of a length", 1e3 * done.correction, "mm"),
-        ("distance from the plan, estimated", 1e3 * np.linalg.norm(position_error(done), axis=1), "mm"),
+        ("distance from the plan, estimated", 1e3 * np.linalg.norm(sl.control.position_error(done), axis=1), "mm"),
         ("age of a sample", 1e3 * done.samples.age, "ms"),
         ("delay of a cycle", 1e3 * done.late, "ms"),
     ]
@@ -141,7 +127,7 @@ def _extremes(done: Execution) -> list[tuple[str, float, str, float, int | None]
     return found
 
 
-def _histogram(done: Execution) -> list[list[str]]:
+def _histogram(done: sl.control.Execution) -> list[list[str]]:
     """Histogram of the cycles' delays, without the empty bars at its end."""
     counts = [int(np.count_nonzero(done.late <= 0.0))]
     counts += [int(np.count_nonzero((done.late > low) & (done.late <= high))) for low, high in pairwise(LATE)]
@@ -158,7 +144,7 @@ def _histogram(done: Execution) -> list[list[str]]:
     ]
 
 
-def _record(done: Execution, to: Path | None) -> dict[str, Any]:
+def _record(done: sl.control.Execution, to: Path | None) -> dict[str, Any]:
     counts = {row[0]: float(row[1]) for row in _states(done)}
     return {
         "robot": done.robot.name,
@@ -175,5 +161,5 @@ def _record(done: Execution, to: Path | None) -> dict[str, Any]:
     }
 
 
-def _quantile(done: Execution, share: float) -> float | None:
+def _quantile(done: sl.control.Execution, share: float) -> float | None:
     return float(np.quantile(done.late, share)) if len(done) else None

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version
-from inspect import cleandoc
+from inspect import cleandoc, signature
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, cast, get_type_hints
+from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -19,7 +19,8 @@ from typer.main import get_command_from_info
 from typer.models import CommandInfo
 
 from sagline.cli.ending import exit_code_of
-from sagline.cli.options import Condition
+from sagline.cli.options import Condition, expanded
+from sagline.core.errors import InvalidValueError
 from sagline.files.writing import finished_files
 
 GROUPS = {  # the subcommands in the order in which the help lists them
@@ -68,7 +69,7 @@ Start here:
 
 
 class _Formatter(cast(Any, typer.Context.formatter_class)):  # type: ignore[misc]
-    """Formatter of help texts that does not break lines inside names with hyphens."""
+    """Formatter of help texts. It does not break lines at the hyphens of names."""
 
     def write_dl(self, rows: Sequence[tuple[str, str]], *more: Any, **extra: Any) -> None:
         """Write a list of options or commands."""
@@ -79,15 +80,15 @@ class _Formatter(cast(Any, typer.Context.formatter_class)):  # type: ignore[misc
         super().write_text(text.replace("-", HYPHEN))
 
     def getvalue(self) -> str:
-        """The help text, with the non-breaking hyphens replaced by usual ones."""
+        """The help text, in which usual hyphens replace non-breaking hyphens."""
         return str(super().getvalue()).replace(HYPHEN, "-")
 
 
 class _Command(TyperCommand):
-    """A subcommand that rejects empty arguments and options without effect; its help shows arguments without braces.
+    """A subcommand. It rejects empty arguments and options without effect. Its help shows arguments without braces.
 
     Attributes:
-        conditions: For each parameter, the other options that must be given, or must be missing.
+        conditions: For each parameter, conditions on other options, which must be given or must be missing.
     """
 
     conditions: Mapping[str, Sequence[Condition]]
@@ -96,7 +97,7 @@ class _Command(TyperCommand):
         """Parse `args`. Empty texts are rejected, because an empty path would mean the current folder."""
         former = FORMER.get(self.name or "", {})
         args = [former.get(name, name) + sign + value for name, sign, value in (arg.partition("=") for arg in args)]
-        if not ctx.resilient_parsing:  # resilient parsing is used for completion in the shell
+        if not ctx.resilient_parsing:  # the shell uses resilient parsing to complete words
             given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
             parameter: Any  # typer has its own class of parameters
             for parameter in self.get_params(ctx):
@@ -108,13 +109,17 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, args)
 
     def _check_conditions(self, given: Mapping[str, Any]) -> None:
-        """Reject an option that has no effect because of the other options."""
+        """Reject an option in `given` that has no effect, because another option is missing or given."""
         by_label: dict[str, Any] = {_label(parameter): parameter for parameter in self.params}
         for label, parameter in by_label.items():
-            for condition in self.conditions.get(parameter.name, ()) if given.get(parameter.name) is not None else ():
-                other = by_label[condition.other]
-                if (given.get(other.name, other.default) in (None, False)) == condition.given:
-                    raise condition.error(label)
+            for name, needed in (
+                self.conditions.get(parameter.name, ()) if given.get(parameter.name) is not None else ()
+            ):
+                other = by_label[name]
+                if (given.get(other.name, other.default) in (None, False)) == needed:
+                    word, allowed = ("without", "both") if needed else ("with", "only one of the two")
+                    step = f"Add {name}, or leave out {label}." if needed else f"Leave out {label}, or {name}."
+                    raise InvalidValueError(label, f"given {word} {name}", allowed, step)
 
     def get_help(self, ctx: Any) -> str:
         """The help."""
@@ -127,7 +132,7 @@ class _Command(TyperCommand):
 
 
 class _Commands(Mapping[str, _Command]):
-    """The subcommands by name. The module of a subcommand is imported when the subcommand is read here."""
+    """The subcommands by name. Reading a subcommand imports its module."""
 
     def __getitem__(self, name: str) -> _Command:
         """The subcommand of a name."""
@@ -145,7 +150,7 @@ class _Commands(Mapping[str, _Command]):
 
 
 class _Group(TyperGroup):
-    """The group of the subcommands; an error in a subcommand becomes one line and an exit code."""
+    """The group of the subcommands. It turns an error of a subcommand into one line and an exit code."""
 
     def __init__(self, **attributes: Any) -> None:
         """Take the attributes from the group that typer makes."""
@@ -189,7 +194,7 @@ class _Group(TyperGroup):
 app = typer.Typer(
     cls=_Group,
     no_args_is_help=True,
-    rich_markup_mode=None,  # plain help has the same text at every width, and no colors
+    rich_markup_mode=None,  # plain help has no colors, and the same words at every width
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -199,13 +204,10 @@ app = typer.Typer(
 def _load_command(name: str) -> _Command:
     """Import a subcommand, and read its options from the signature of its function."""
     function = getattr(import_module(f"sagline.cli.{MODULES.get(name, name)}"), name.replace("-", "_"))
-    text = _help(function.__doc__)
-    info = CommandInfo(name=name, cls=_Command, callback=function, help=text, short_help=text.partition("\n\n")[0])
+    text, call = _help(function.__doc__), expanded(function)
+    info = CommandInfo(name=name, cls=_Command, callback=call, help=text, short_help=text.partition("\n\n")[0])
     made: Any = get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
-    made.conditions = {
-        parameter: [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, Condition)]
-        for parameter, hint in get_type_hints(function, include_extras=True).items()
-    }
+    made.conditions = {each.name: each.default.conditions for each in signature(call).parameters.values()}
     return cast(_Command, made)
 
 
@@ -215,7 +217,7 @@ def _label(parameter: Any) -> str:
 
 
 def _before(finished: Sequence[Path]) -> str:
-    """The note about the files that were complete before an error."""
+    """Note that names the files in `finished`, which were complete before an error."""
     names = ", ".join(file.name for file in finished[:MOST_NAMES])
     more = f" and {len(finished) - MOST_NAMES} more" if len(finished) > MOST_NAMES else ""
     return f"Complete files before the error: {names}{more} in {finished[0].parent}"
@@ -228,7 +230,7 @@ def _print_version(wanted: bool) -> None:
 
 
 def _help(text: str | None) -> str:
-    """A docstring as help text; the lines of indented paragraphs are not joined."""
+    """A docstring as help text. The lines of an indented paragraph are not joined."""
     paragraphs = cleandoc(text or "").split("\n\n")
     return "\n\n".join(f"\b\n{paragraph}" if paragraph.startswith(" ") else paragraph for paragraph in paragraphs)
 

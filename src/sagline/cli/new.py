@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import asdict, dataclass
 from math import prod
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.terminal import show_note, show_text, working
-from sagline.cli.view import ServerAddress, view_robot
+from sagline.cli.view import ServerOptions, view_robot
 from sagline.core.numbers import n
 from sagline.files.writing import write_text
 
@@ -22,10 +23,10 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
     from sagline.robot.catalogue import Design
 
-MIDDLE = 0.5  # box of the printed feasible share: its edges relative to those of the frame
-GRID = (7, 7, 7)  # numbers of poses along the edges of this box and of the test box
+MIDDLE = 0.5  # edges of the box of the printed feasible share, relative to the edges of the frame
+GRID = (7, 7, 7)  # numbers of poses along the edges of a box
 NEARLY_ALL = 0.95  # smallest feasible share in the test box of the file
-_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # boxes to try in this order: their edges relative to those of the frame
+_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # edges of possible test boxes, relative to the edges of the frame
 
 
 ROPE_NAMES = "dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19"
@@ -42,19 +43,26 @@ QUESTIONS = {  # text of the question and default, by the name of the option
 }
 
 
+@dataclass(frozen=True)
+class _Answers:
+    """Answers to the questions of the same names. If an answer is None, the command asks the question."""
+
+    frame: str | None = opt.option(None, "SIZE", 'Edges of the frame, "6 x 4 x 3 m".')
+    layout: str | None = opt.option(None, "LAYOUT", "top: cables from above; mixed: from above and below.")
+    cables: str | None = opt.option(None, "NUMBER", "Number of cables, 6 to 8.")
+    platform: str | None = opt.option(None, "SIZE", 'Edges of the platform, "0.5 x 0.5 x 0.4 m".')
+    mass: str | None = opt.option(None, "MASS", 'Mass of the platform with its load, "30 kg".')
+    rope: str | None = opt.option(None, "ROPE", f"Rope of the cables: {ROPE_NAMES}.")
+    diameter: str | None = opt.option(None, "LENGTH", 'Diameter of the rope, "4 mm".')
+
+
 def new(
-    file: Annotated[Path, opt.argument("FILE", "The robot file to write, my_robot.yaml.")],
-    frame: Annotated[str | None, opt.option("SIZE", 'Edges of the frame, "6 x 4 x 3 m".')] = None,
-    layout: Annotated[str | None, opt.option("LAYOUT", "top: cables from above; mixed: from above and below.")] = None,
-    cables: Annotated[str | None, opt.option("NUMBER", "Number of cables, 6 to 8.")] = None,
-    platform: Annotated[str | None, opt.option("SIZE", 'Edges of the platform, "0.5 x 0.5 x 0.4 m".')] = None,
-    mass: Annotated[str | None, opt.option("MASS", 'Mass of the platform with its load, "30 kg".')] = None,
-    rope: Annotated[str | None, opt.option("ROPE", f"Rope of the cables: {ROPE_NAMES}.")] = None,
-    diameter: Annotated[str | None, opt.option("LENGTH", 'Diameter of the rope, "4 mm".')] = None,
-    force: opt.ForceOption = False,
-    look: Annotated[bool, opt.flag("Show it in the browser afterwards.", "--view")] = False,
+    file: Path = opt.argument(opt.NEEDED, "FILE", "The robot file to write (my_robot.yaml)."),
+    answers: _Answers = _Answers(),
+    force: bool = opt.FORCE,
+    look: bool = opt.flag(False, "Show it in the browser afterwards.", "--view"),
 ) -> int:
-    r"""Make a robot file of your own; the command asks for missing options, checks the robot and describes it.
+    r"""Make a robot file of your own. The command asks for missing options, checks the robot and describes the robot.
 
     Without a terminal, the answers are read from the lines of stdin. An empty line means the default.
 
@@ -66,12 +74,8 @@ def new(
     """
     from sagline.files.robot_file import parse_robot
 
-    answers = {
-        "frame": frame, "layout": layout, "cables": cables, "platform": platform, "mass": mass, "rope": rope,
-        "diameter": diameter,
-    }  # fmt: skip
     _check_file(file, force=force)
-    design, said = _answered(file.stem, answers)
+    design, said = _answered(file.stem, asdict(answers))
     with working(f"checking {prod(GRID)} poses of each of a few boxes"):
         robot, middle = _boxed(design)
     text = _header(said) + sl.dump_robot(robot)
@@ -91,7 +95,7 @@ def new(
         show_text(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
     if not look:
         return 0
-    return view_robot(made, file, ServerAddress("127.0.0.1", 8080, browser=True))
+    return view_robot(made, file, opt.with_defaults(ServerOptions))
 
 
 def _check_file(file: Path, *, force: bool) -> None:
@@ -102,7 +106,7 @@ def _check_file(file: Path, *, force: bool) -> None:
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
-    """The design and the answers that define it. On a terminal, a question is repeated after an invalid answer."""
+    """The design and all answers. On a terminal, a question is repeated after an invalid answer."""
     asks = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     said: dict[str, str] = {}
     for key, (question, default) in QUESTIONS.items():
@@ -126,7 +130,7 @@ def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[s
 
 
 def _read(key: str, question: str, default: str) -> str:
-    """An answer from a line of a pipe or a file; an empty line means the default."""
+    """An answer from a line of stdin, which is a pipe or a file. An empty line means `default`."""
     line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
     if line:
         return line.strip() or default
@@ -136,7 +140,7 @@ def _read(key: str, question: str, default: str) -> str:
 
 
 def _design(name: str, said: dict[str, str]) -> Design:
-    """The design from the first answers; valid values replace the answers that are still missing."""
+    """The design with the answers `said`. Valid values replace the answers that are still missing."""
     from sagline.cables.cable import ROPES
     from sagline.cli.values import quantity
     from sagline.robot.catalogue import COUNTS, LAYOUTS, Design
@@ -154,7 +158,7 @@ def _design(name: str, said: dict[str, str]) -> Design:
         layout=layout,
     )
     if len(said) == len(QUESTIONS):
-        design.robot()  # this checks that the rope can support the platform
+        design.robot()  # an error if the rope cannot support the platform
     return design
 
 
@@ -181,12 +185,14 @@ def _edges(text: str, item: str) -> Array:
 
 
 def _boxed(design: Design) -> tuple[sl.Robot, sl.Plan]:
-    """The robot with the largest test box that has enough feasible poses, and the plan in the middle of the frame."""
+    """The robot with its largest test box with nearly all poses feasible, and the plan in the middle of its frame."""
+    from sagline.robot.pose import level_grid
+
     robot = design.robot()
-    middle = sl.inverse(robot, opt.level_grid(design.placed(MIDDLE), GRID))
+    middle = sl.inverse(robot, level_grid(design.placed(MIDDLE), GRID))
     for share in _BOXES:
         box = design.placed(share)
-        if sl.inverse(robot, opt.level_grid(box, GRID)).feasible.mean() >= NEARLY_ALL:
+        if sl.inverse(robot, level_grid(box, GRID)).feasible.mean() >= NEARLY_ALL:
             return robot.replace(test_box=box), middle
     return robot, middle
 
@@ -197,7 +203,7 @@ def _header(said: dict[str, str]) -> str:
 
 
 def _explained(robot: sl.Robot, design: Design, middle: sl.Plan) -> tuple[list[str], float]:
-    """Lines about the robot, with the feasible share of the poses in the middle of its frame."""
+    """Lines about `robot`, and the feasible share of the poses of `middle`, in the middle of its frame."""
     from sagline.cables.cable import ROPES, SAFETY
     from sagline.robot.catalogue import SLACK_LIMIT
 

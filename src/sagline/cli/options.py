@@ -1,38 +1,35 @@
-"""Arguments and options of the subcommands: functions that declare them, and those that several commands have."""
+"""Arguments and options of the subcommands: their declaration, and the options that several commands have.
+
+A declaration is the default value of a parameter, `cells: int = opt.option(32, "NUMBER", "Cells of the grid.")`, or of
+a field of a dataclass. A parameter whose type is such a dataclass is replaced by its fields.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any, Final, TypeVar, cast, get_type_hints
 
 import typer
+from typer.models import ParameterInfo
 
 import sagline as sl
+from sagline.core.arguments import word_of
 from sagline.core.errors import InvalidValueError
+from sagline.core.surface import ordered_names
+
+T = TypeVar("T")
+Completion = Callable[[str], list[str]] | None
+
+NEEDED: Final[Any] = ...  # default of an argument or option that must be given
 
 FORMATS = ("png", "svg", "pdf")  # formats of figures
-USUAL_FORMATS = "png,svg"
-
-
-class ModelName(StrEnum):
-    """Cable models."""
-
-    CATENARY = "catenary"
-    EMPIRICAL = "empirical"
-    PARABOLIC = "parabolic"
-    ELASTIC = "elastic"
-    STRAIGHT = "straight"
-
-    def build(self) -> sl.CableModel:
-        """The model, with its default constants."""
-        from sagline.cables.models import model_of
-
-        return model_of(self.value)
 
 
 class TensionVariable(StrEnum):
@@ -41,28 +38,6 @@ class TensionVariable(StrEnum):
     CHORD = "chord"
     HORIZONTAL = "horizontal"
     FRAME_END = "frame_end"
-
-
-class Tension(StrEnum):
-    """Tension distribution methods, with their default options."""
-
-    CLOSEST = "closest"
-    MINIMUM_NORM = "minimum-norm"
-    LOWEST_SUM = "lowest-sum"
-    LOWEST_MAXIMUM = "lowest-maximum"
-    P_NORM = "p-norm"
-    CENTROID = "centroid"
-    ANALYTIC_CENTER = "analytic-center"
-    CLOSED_FORM = "closed-form"
-    IMPROVED_CLOSED_FORM = "improved-closed-form"
-    PUNCTURE = "puncture"
-    POLYGON_WALK = "polygon-walk"
-
-    def build(self, variable: TensionVariable) -> sl.TensionMethod:
-        """The method with a tension variable."""
-        from sagline.tension.methods import METHODS
-
-        return METHODS[self.value.title().replace("-", "")](variable.value)
 
 
 class FigureStyle(StrEnum):
@@ -77,95 +52,147 @@ class FigureStyle(StrEnum):
     SLIDES_WIDE = "slides-wide"
 
     def active(self) -> AbstractContextManager[object]:
-        """A context; figures that are made inside it have this style."""
+        """Context in which figures get the style."""
         if self is FigureStyle.PLAIN:
             return nullcontext()
         name, _, wide = self.value.partition("-")
         return sl.plot.style(name, 2 if wide else 1)
 
 
+MODELS: Final = tuple(word_of(name) for name in ordered_names("sagline.cables"))[::-1]
+METHODS: Final = tuple(word_of(name) for name in ordered_names("sagline.tension"))
+# Tension distribution methods with their default options. The tensions of QuadraticProgram would be the minimum norm.
+TENSIONS: Final = tuple(name for name in METHODS if name != "quadratic-program")
+
+
+def model_named(name: str) -> sl.CableModel:
+    """The model of the option `--model`, with its default constants."""
+    from sagline.cables.models import model_of
+
+    return model_of(name)
+
+
+def tension_named(name: str, variable: TensionVariable = TensionVariable.CHORD) -> sl.TensionMethod:
+    """The method of the option `--tension` with a tension variable."""
+    from sagline.tension.methods import methods_by_name
+
+    return methods_by_name()[name.title().replace("-", "")](variable.value)
+
+
 def robot_completions(incomplete: str) -> list[str]:
-    """Completion in the shell: the presets and robot files whose names begin with a text."""
+    """Presets and robot files whose names begin with `incomplete`, for completion in the shell."""
     from glob import escape, glob
 
     files = sorted(glob(f"{escape(incomplete)}*.yaml") + glob(f"{escape(incomplete)}*.yml"))
     return [name for name in sl.robot_names() if name.startswith(incomplete)] + files
 
 
-def argument(metavar: str, text: str, completion: Callable[[str], list[str]] | None = None) -> Any:
-    """An argument."""
-    return typer.Argument(metavar=metavar, help=text, autocompletion=completion)
+# Condition of an option that has an effect only if another option is given (True), or only if it is missing (False).
+# The text is the name of the other option, "--prove", or of an argument, "PATH".
+Condition = tuple[str, bool]
 
 
-def option(metavar: str, text: str, *names: str) -> Any:
-    """An option with a value; without `names`, it has the name of the parameter."""
-    return typer.Option(*names, metavar=metavar, help=text)
+def only_with(other: str) -> Condition:
+    """Condition of an option that has an effect only if `other` is given."""
+    return other, True
 
 
-def converted(metavar: str, text: str, function: str | Callable[..., Any], *names: str, **arguments: object) -> Any:
-    """An option whose text a function converts to the value; a name is that of a function of `sagline.cli.values`."""
+def only_without(other: str) -> Condition:
+    """Condition of an option that has an effect only if `other` is missing."""
+    return other, False
+
+
+def argument(default: T, metavar: str, text: str, *conditions: Condition, completion: Completion = None) -> T:
+    """An argument with its default value, or `NEEDED`."""
+    declared: T = typer.Argument(default, metavar=metavar, help=text, autocompletion=completion)
+    return _with(declared, conditions)
+
+
+def option(default: T, metavar: str, text: str, *more: str | Condition, **settings: Any) -> T:
+    """An option with its default value, or `NEEDED`. `more`: conditions, and names other than that of the parameter."""
+    names = [each for each in more if isinstance(each, str)]
+    conditions = [each for each in more if not isinstance(each, str)]
+    declared: T = typer.Option(default, *names, metavar=metavar or None, help=text, **settings)
+    return _with(declared, conditions)
+
+
+def flag(default: bool, text: str, *more: str | Condition) -> bool:
+    """An option without a value."""
+    return option(default, "", text, *more)
+
+
+def choice(default: T, metavar: str, text: str, choices: type[StrEnum], *more: str | Condition) -> T:
+    """An option whose value is one of `choices`. The help lists them."""
+    return option(default, metavar, f"{text}: {', '.join(each.value for each in choices)}.", *more)
+
+
+def one_of(default: T, metavar: str, text: str, names: Sequence[str]) -> T:
+    """An option whose value is one of `names`, or several of them. The help lists them."""
+
+    def check(given: str) -> str:
+        if given not in names:
+            raise typer.BadParameter(f"{given!r} is not one of {', '.join(map(repr, names))}.")
+        return given
+
+    def completions(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return option(default, metavar, f"{text}: {', '.join(names)}.", parser=check, autocompletion=completions)
+
+
+def converted(
+    default: object, metavar: str, text: str, function: str | Callable[..., Any], *more: str | Condition, **limits: Any
+) -> Any:
+    """An option whose text `function` converts to the value. A text names a function of `sagline.cli.values`."""
 
     def convert(parameter: typer.CallbackParam, value: Any) -> Any:
         if not isinstance(value, str):
             return value  # the default value
         if callable(function):
-            return function(value, parameter.opts[-1], **arguments)
+            return function(value, parameter.opts[-1], **limits)
         from sagline.cli import values
 
-        return getattr(values, function)(value, parameter.opts[-1], **arguments)
+        return getattr(values, function)(value, parameter.opts[-1], **limits)
 
-    return typer.Option(*names, metavar=metavar, help=text, parser=_unchanged, callback=convert)
-
-
-def quantity(metavar: str, text: str, unit: str, *names: str, **limits: float) -> Any:
-    """An option for a number, in SI or with a unit. The number must be at least `low` and greater than `above`."""
-    return converted(metavar, text, "quantity", *names, unit=unit, **limits)
+    # the callback converts the text, because typer would change the message of an error that the parser raises
+    return option(default, metavar, text, *more, parser=_unchanged, callback=convert)
 
 
-def choice(metavar: str, text: str, choices: type[StrEnum]) -> Any:
-    """An option whose value is one of a few words; the help lists the words."""
-    return option(metavar, f"{text}: {', '.join(each.value for each in choices)}.")
+def quantity(default: T, metavar: str, text: str, unit: str, *more: str | Condition, **limits: float) -> T:
+    """An option for a number, in SI units or with its unit. The number is at least `low` and greater than `above`."""
+    return cast(T, converted(default, metavar, text, "quantity", *more, unit=unit, **limits))
 
 
-def flag(text: str, *names: str) -> Any:
-    """An option without a value."""
-    return typer.Option(*names, help=text)
+def out(default: T, shown: str | bool = True, *conditions: Condition) -> T:
+    """The option `--out`; its help shows `shown` as the default."""
+    text = "Folder for the files, or name of the main file with its suffix. The other names then begin with its stem."
+    return option(default, "DIR|FILE", text, "--out", *conditions, show_default=shown)
 
 
-def out_option(default: str | bool = True) -> Any:
-    """The option `--out`; its help shows this text as the default."""
-    text = "Folder for the files. A name with a suffix is the main file; the other names then begin with its stem."
-    return typer.Option("--out", metavar="DIR|FILE", help=text, show_default=default)
+def seed(default: int, *conditions: Condition) -> int:
+    """The option `--seed`."""
+    text = "Seed of the random numbers; the same seed gives the same numbers."
+    return cast(int, converted(default, "NUMBER", text, whole_of, *conditions, least=0, most=2**63 - 1))
 
 
-@dataclass(frozen=True)
-class Condition:
-    """Condition of an option that has an effect only with, or only without, another option; part of `Annotated`."""
-
-    other: str  # the other option, "--prove", or the name of an argument in the help, "PATH"
-    given: bool  # true if the other option must be given; False if it must be missing
-
-    def error(self, option: str) -> InvalidValueError:
-        """Error of an option that would have no effect."""
-        if self.given:
-            step = f"Add {self.other}, or leave out {option}."
-            return InvalidValueError(option, f"given without {self.other}", "both", step)
-        step = f"Leave out {option}, or {self.other}."
-        return InvalidValueError(option, f"given with {self.other}", "only one of the two", step)
+def port(default: int) -> int:
+    """The option `--port`."""
+    text = "Port to listen on; 0 selects a free port."
+    return cast(int, converted(default, "NUMBER", text, whole_of, least=0, most=65535))
 
 
-def only_with(other: str) -> Condition:
-    """Condition of an option that has an effect only together with another option."""
-    return Condition(other, given=True)
+def if_only(option: T, *conditions: Condition) -> T:
+    """A copy of `option` with other conditions."""
+    return _with(copy(option), conditions)
 
 
-def only_without(other: str) -> Condition:
-    """Condition of an option that has an effect only without another option."""
-    return Condition(other, given=False)
+def _with(declared: T, conditions: Sequence[Condition]) -> T:
+    """An option or argument of typer, with the conditions that `main` reads."""
+    cast(Any, declared).conditions = conditions
+    return declared
 
 
 def _unchanged(value: Any) -> Any:
-    """The unchanged text. A callback converts the text, because typer would change the error message of a parser."""
     return value
 
 
@@ -177,109 +204,138 @@ def whole_of(text: str, item: str, least: int, most: int) -> int:
 
 
 def middle_pose(robot: sl.Robot) -> sl.Pose:
-    """Level pose in the middle of a robot's test box. InvalidValueError if the robot has no test box."""
+    """Level pose in the middle of the test box of `robot`. InvalidValueError if `robot` has no test box."""
     if robot.test_box is None:
         raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot has no test box.")
     return sl.Pose((robot.test_box.low + robot.test_box.high) / 2, [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
-def level_grid(box: sl.PoseBox, points: Sequence[int]) -> sl.Pose:
-    """Level poses on an even grid in a box; an axis with a single point has it in the middle."""
-    import numpy as np
-
-    axes = [
-        np.linspace(low, high, count) if count > 1 else np.array([0.5 * (low + high)])
-        for low, high, count in zip(box.low, box.high, points, strict=True)
-    ]
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return sl.Pose.from_euler(places, 0.0, 0.0, 0.0)
-
-
 def robot_with_payload(name: str, payload: float | None) -> sl.Robot:
-    """The robot of a name or a file, with a payload [kg]; its inertia increases in proportion to its mass."""
+    """The preset or robot file `name` with a payload [kg]. The inertia increases in proportion to the mass."""
     robot = sl.load_robot(name)
     return robot if payload is None else robot.with_payload(payload)
 
 
-RobotArgument = Annotated[
-    str, argument("ROBOT", "A preset (see sagline robots) or a robot file, robot.yaml.", robot_completions)
-]
-OutOption = Annotated[Path, out_option()]
-FileOption = Annotated[Path | None, out_option("stdout")]
-JsonOption = Annotated[bool, flag("Print only the numbers on stdout, as JSON.", "--json")]
-TableOption = Annotated[bool, flag("Write the whole table as a CSV file.", "--csv/--no-csv")]
-FiguresOption = Annotated[bool, flag("Draw figures.", "--figures/--no-figures")]
-STYLE = choice("STYLE", "Style of the figures", FigureStyle)
-StyleOption = Annotated[FigureStyle, STYLE, only_with("--figures")]
-FormatsOption = Annotated[
-    Any,
-    converted(
+ROBOT = argument(
+    NEEDED, "ROBOT", "A preset (see sagline robots) or a robot file (robot.yaml).", completion=robot_completions
+)
+OUTPUT = out(Path("output"))
+STDOUT: Path | None = out(None, "stdout")
+JSON = flag(False, "Print only the numbers on stdout, as JSON.", "--json")
+TABLE = flag(False, "Write the whole table as a CSV file.", "--csv/--no-csv")
+STYLE = choice(FigureStyle.PLAIN, "STYLE", "Style of the figures", FigureStyle)
+FORCE = flag(False, "Replace files that exist.", "--force")
+MODEL: str = one_of("catenary", "MODEL", "Cable model", MODELS)
+VARIABLE = choice(TensionVariable.CHORD, "VARIABLE", "Tension variable of the method", TensionVariable)
+TENSION: str = one_of("closest", "METHOD", "Tension distribution method", TENSIONS)
+WRENCH = converted(
+    None,
+    "FX,FY,FZ[,MX,MY,MZ]",
+    "Force [N] and moment [N m] on the platform in addition to its weight, about its center of mass, in world axes.",
+    "wrench_of_text",
+)
+PAYLOAD: float | None = quantity(
+    None, "MASS", "Additional mass on the platform, 20 or '20 kg'. The inertia increases in proportion.", "kg", low=0.0
+)
+POSE = converted(
+    None,
+    "X,Y,Z[,A,B,C]",
+    "Position [m] and angles about z, y, x [degrees]. Default: middle of the robot's test box.",
+    "pose_of_text",
+)
+LOSS_TIME: float | None = quantity(
+    None, "TIME", "Loss time [s] of the cable material: axial stiffness EA (1 + i omega TIME).", "s", low=0.0
+)
+AIR_DAMPING: float = quantity(
+    0, "NUMBER", "Damping of the cables by air, per length and velocity [N s/m^2].", "N*s/m^2", low=0.0
+)
+MODBUS = flag(False, "Use Modbus TCP instead of S7.", "--modbus")
+PRIORITY: int | None = option(None, "NUMBER", "Run in real time (Linux's SCHED_FIFO) with this priority, 1 to 99.")
+HOST = option("127.0.0.1", "ADDRESS", "Address to listen on; 0.0.0.0 and :: mean all addresses.")
+TRUE: str | None = option(
+    None, "ROBOT", "Robot file of the simulated machine, if it differs from the robot that the controller assumes."
+)
+LOG: Path | None = option(None, "FILE", "Write a log to this file in MCAP format (run.mcap).")
+
+
+def _formats_of(text: str, item: str) -> tuple[str, ...]:
+    """Formats of figures from a text such as "png, pdf"."""
+    found = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",")))
+    if not set(found) <= set(FORMATS):
+        raise InvalidValueError(item, repr(text), ", ".join(FORMATS), f"Give one or several: {item} png,pdf.")
+    return found
+
+
+@dataclass(frozen=True)
+class Files:
+    """Options of the files that a command writes. In a subclass, a field without a declaration has a fixed value."""
+
+    folder: Path = OUTPUT
+    figures: bool = flag(True, "Draw figures.", "--figures/--no-figures")
+    formats: Any = converted(
+        "png,svg",
         "FORMATS",
         f"Formats of the figures, separated by commas: {', '.join(FORMATS)}.",
-        "formats_of",
+        _formats_of,
         "--format",
-        known=FORMATS,
-    ),
-    only_with("--figures"),
-]
-ForceOption = Annotated[bool, flag("Replace files that exist.", "--force")]
-ModelOption = Annotated[ModelName, choice("MODEL", "Cable model", ModelName)]
-VariableOption = Annotated[TensionVariable, choice("VARIABLE", "Tension variable of the method", TensionVariable)]
-WrenchOption = Annotated[
-    Any,
-    converted(
-        "FX,FY,FZ[,MX,MY,MZ]",
-        "Force [N] and moment [N m] on the platform in addition to its weight, about its center of mass, in world "
-        "axes.",
-        "wrench_of_text",
-    ),
-]
-PayloadOption = Annotated[
-    float | None,
-    quantity(
-        "MASS",
-        "Additional mass on the platform, 20 or '20 kg'. The inertia increases in proportion.",
-        "kg",
-        low=0.0,
-    ),
-]
-PoseOption = Annotated[
-    Any,
-    converted(
-        "X,Y,Z[,A,B,C]",
-        "Position [m] and angles about z, y, x [degrees]. Default: middle of the robot's test box.",
-        "pose_of_text",
-    ),
-]
-TensionOption = Annotated[Tension, choice("METHOD", "Tension distribution method", Tension)]
-LossTimeOption = Annotated[
-    float | None,
-    quantity("TIME", "Loss time [s] of the cable material: axial stiffness EA (1 + i omega TIME).", "s", low=0.0),
-]
-AirDampingOption = Annotated[
-    float,
-    quantity("NUMBER", "Damping of the cables by air, per length and velocity [N s/m^2].", "N*s/m^2", low=0.0),
-]
-ModbusOption = Annotated[bool, flag("Use Modbus TCP instead of S7.", "--modbus")]
-PriorityOption = Annotated[
-    int | None, option("NUMBER", "Run in real time (Linux's SCHED_FIFO) with this priority, 1 to 99.")
-]
-SeedOption = Annotated[
-    int,
-    converted(
-        "NUMBER",
-        "Seed of the random numbers; the same seed gives the same numbers.",
-        whole_of,
-        least=0,
-        most=2**63 - 1,
-    ),
-]
-HostOption = Annotated[str, option("ADDRESS", "Address to listen on; 0.0.0.0 and :: mean all addresses.")]
-PortOption = Annotated[
-    int, converted("NUMBER", "Port to listen on; 0 selects a free port.", whole_of, least=0, most=65535)
-]
-TrueOption = Annotated[
-    str | None,
-    option("ROBOT", "Robot file of the simulated machine, if it differs from the robot that the controller assumes."),
-]
-LogOption = Annotated[Path | None, option("FILE", "Write a log to this MCAP file, run.mcap.")]
+        only_with("--figures"),
+    )
+    style: FigureStyle = if_only(STYLE, only_with("--figures"))
+    table: bool = TABLE
+    as_json: bool = JSON
+
+
+@dataclass(frozen=True)
+class DataFiles(Files):
+    """Options of the files of a command without figures."""
+
+    figures: bool = False
+    formats: Any = ()
+    style: FigureStyle = FigureStyle.PLAIN
+
+
+@dataclass(frozen=True)
+class TableFiles(DataFiles):
+    """Options of a command whose only file is a table."""
+
+    folder: Path = if_only(OUTPUT, only_with("--csv"))
+
+
+def expanded(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function like `function`, with one parameter per option: the fields of each dataclass replace the dataclass."""
+    hints, groups = get_type_hints(function), dict[str, type[Any]]()
+    options: dict[str, Parameter] = {}
+    for name, each in signature(function).parameters.items():
+        hint = hints[name]
+        if isinstance(hint, type) and is_dataclass(hint):
+            groups[name] = hint
+            options |= {part.name: part for part in _options_of(hint, each.default)}
+        else:
+            options[name] = each.replace(annotation=hint, kind=Parameter.KEYWORD_ONLY)
+
+    def call(**given: Any) -> Any:
+        made = {
+            name: group(**{each.name: given.pop(each.name) for each in fields(group) if each.name in options})
+            for name, group in groups.items()
+        }
+        return function(**given, **made)
+
+    call.__signature__ = Signature(list(options.values()))  # type: ignore[attr-defined]
+    call.__annotations__ = {name: each.annotation for name, each in options.items()}
+    return call
+
+
+def with_defaults(group: type[T]) -> T:
+    """An instance of a dataclass of options, with the declared default values."""
+    declared = {each.name: each.default for each in fields(cast(Any, group)) if isinstance(each.default, ParameterInfo)}
+    return group(**{name: each.default for name, each in declared.items()})
+
+
+def _options_of(group: type[Any], defaults: Any) -> Iterator[Parameter]:
+    """Parameters for the declared fields of `group`. The values of the instance `defaults` are the default values."""
+    hints = get_type_hints(group)
+    for each in fields(group):
+        if isinstance(each.default, ParameterInfo):
+            declared, value = copy(each.default), getattr(defaults, each.name)
+            declared.default = declared.default if value is each.default else value
+            yield Parameter(each.name, Parameter.KEYWORD_ONLY, default=declared, annotation=hints[each.name])

@@ -1,4 +1,4 @@
-"""Tables that the commands print and write as CSV, and the files that they write."""
+"""Tables and files of the commands."""
 
 from __future__ import annotations
 
@@ -8,28 +8,31 @@ from dataclasses import dataclass, field
 from itertools import pairwise, starmap
 from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
 from rich.console import Console
 from rich.measure import Measurement
-from rich.table import Table
+from rich.table import Table as RichTable
 from rich.text import Text
 
-from sagline.cli.options import FigureStyle
-from sagline.cli.terminal import FREE, show_json, show_pieces, show_text
+from sagline.cli.options import Files
+from sagline.cli.terminal import FREE, show_data, show_json, show_pieces, show_text
 from sagline.core.errors import FileError, printable
 from sagline.files.writing import check_files, check_folder, create_folder, write_text
 
-FigureMaker = Callable[[], Any]  # makes a figure of matplotlib, or the axes of one
+if TYPE_CHECKING:
+    from sagline.core.table import Table
+
+FigureMaker = Callable[[], Any]  # makes a figure of matplotlib, or the axes of a figure
 
 ENDING = re.compile(r"\.[a-z]{1,5}", re.IGNORECASE)  # suffix by which --out is recognized as a file
 
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table of texts. Pieces of a table that is too wide repeat its first column; cells are never shortened."""
+    """A table of texts. A table that is too wide is printed in pieces, which repeat the first column."""
 
     heads: Sequence[str]  # heads of the columns; a head may have several lines
     rows: Sequence[Sequence[str]]  # rows, each with one text per column
@@ -39,8 +42,8 @@ class TextTable:
     # indices of the columns whose cells may be broken into several lines
     prose: frozenset[int] = field(default=frozenset())
 
-    def pieces(self, console: Console, width: int) -> list[tuple[Table, int]]:
-        """The pieces of the table: as few as fit the width, each with about the same number of columns."""
+    def pieces(self, console: Console, width: int) -> list[tuple[RichTable, int]]:
+        """The smallest number of pieces that fit into `width`, with about equal numbers of columns."""
         full = self._filled(console, width)
         edges = [1 + (len(self.heads) - 1) * k // len(full) for k in range(len(full) + 1)]
         even = list(starmap(range, pairwise(edges)))
@@ -52,7 +55,7 @@ class TextTable:
         return pieces
 
     def _filled(self, console: Console, width: int) -> list[range]:
-        """Columns of each piece: as many consecutive columns as fit into `width`, and at least one."""
+        """Columns of each piece: at least one, and as many consecutive columns as fit into `width`."""
         parts, first, count = [], 1, len(self.heads)
         while first < count:
             end = first + 1
@@ -65,10 +68,10 @@ class TextTable:
             first = end
         return parts
 
-    def _table(self, columns: Sequence[int], *, first: bool) -> Table:
-        """A piece of a table; only the first one has the title."""
+    def _table(self, columns: Sequence[int], *, first: bool) -> RichTable:
+        """A piece of a table. Only the first piece has the title."""
         title = Text(printable(self.title)) if first and self.title else None
-        table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
+        table = RichTable(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
         for k in columns:
             texts = [printable(row[k], "\n") for row in (self.heads, *self.rows)]
             parts = [part for text in texts for part in (text.split() if k in self.prose else text.split("\n"))]
@@ -85,18 +88,18 @@ class TextTable:
 
 
 def show_table(grid: TextTable, verdict: str = "") -> None:
-    """Print a verdict and a table below it, as part of the result."""
+    """Print `verdict`, and `grid` below."""
     if verdict:
         show_text(verdict, style="bold")
     show_pieces(grid.pieces)
 
 
-def _least(console: Console, table: Table) -> int:
+def _least(console: Console, table: RichTable) -> int:
     return Measurement.get(console, console.options.update_width(FREE), table).minimum
 
 
 def number_text(number: float, form: str) -> str:
-    """A number with a true minus sign; a dash for NaN."""
+    """A number with a true minus sign, or a dash for NaN."""
     return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no negative zero
 
 
@@ -111,45 +114,49 @@ def is_file(out: Path) -> bool:
 
 
 def file_of(out: Path, name: str) -> Path:
-    """The file that `--out` means; in a folder it has its usual name. Nothing is created."""
+    """The file that the option `out` means: `out`, or the file `name` if `out` is a folder. Nothing is created."""
     if is_file(out):
         return out
     check_folder(out)
     return out / name
 
 
+def write_or_show(text: str, out: Path | None) -> None:
+    """Write `text` to the file `out`, or print it if `out` is None."""
+    if out is None:
+        show_data(text)
+    else:
+        create_folder(out.parent)
+        write_text(out, text)
+
+
 class Output:
-    """The files that a command writes; if a file cannot be written, the command fails before any work."""
+    """The files that a command writes. If a file cannot be written, the command fails before any work."""
 
     def __init__(
-        self,
-        out: Path,
-        stem: str,
-        parts: Iterable[str],
-        figures: Sequence[str] = (),
-        formats: Sequence[str] = (),
-        style: FigureStyle = FigureStyle.PLAIN,
+        self, given: Files, stem: str, parts: Iterable[str] = (), figures: Sequence[str] = (), *tables: str
     ) -> None:
         """Check that all files can be written.
 
         Args:
-            out: A folder; or the path of the first file, whose stem then replaces `stem` in the other names.
-            stem: Beginning of all names; "" if `out` must be a folder.
-            parts: For each file, the end of its name with the suffix.
+            given: Options. `given.folder` may be the path of the first file. Its stem then replaces `stem`.
+            stem: Beginning of all names. If it is "", `given.folder` must be a folder.
+            parts: For each file that is always written, the end of its name with the suffix.
             figures: For each figure, the end of its name without suffix.
-            formats: Suffixes of the figures.
-            style: Style of the figures.
+            tables: For each table, the end of its name with the suffix.
         """
-        whole = [*parts, *(f"{figure}.{suffix}" for figure in figures for suffix in formats)]
-        self.folder, self.files, self._stem = out, list[Path](), stem
-        self._main: dict[str, str] = {}  # path of the first file, if `out` is a file
-        self._figures, self._formats, self._style = list(figures), formats, style
-        if is_file(out):
+        self._given, self._stem, self._main = given, stem, dict[str, str]()  # name of the first file, if it is given
+        self.folder, self.files = given.folder, list[Path]()
+        self._figures = list(figures) if given.figures else []
+        drawn = [f"{name}.{suffix}" for name in self._figures for suffix in given.formats]
+        whole = [*parts, *(tables if given.table else ()), *drawn]
+        if is_file(given.folder):
             suffix = Path(f"_{whole[0]}").suffix if stem and whole else ""
-            if out.suffix.lower() != suffix:
+            if given.folder.suffix.lower() != suffix:
                 step = f"Name a folder{f', or a file that ends in {suffix}' if suffix else ''}."
-                raise FileError(out, "is not a valid name for the files of this command", step)
-            self.folder, self._stem, self._main = out.parent, out.stem, {whole[0]: out.name}
+                raise FileError(given.folder, "is not a valid name for the files of this command", step)
+            self.folder, self._stem = given.folder.parent, given.folder.stem
+            self._main = {whole[0]: given.folder.name}
         if whole:
             check_files(self.folder, map(self._name, whole))
 
@@ -158,37 +165,34 @@ class Output:
         return self._main.get(part, f"{self._stem}{part}")
 
     def file(self, part: str) -> Path:
-        """Path of a file to write now; a missing folder is created."""
+        """Path of a file that is written next. A missing folder is created."""
         create_folder(self.folder)
         self.files.append(self.folder / self._name(part))
         return self.files[-1]
 
-    @property
-    def draws(self) -> bool:
-        """True if figures are wanted."""
-        return bool(self._figures)
+    def table(self, part: str, rows: Callable[[], Iterable[Sequence[object]] | Table]) -> None:
+        """Write a table as CSV if tables are wanted. `rows` returns its rows, or a table of a result."""
+        if self._given.table:
+            from sagline.core.table import Table, csv_text  # the help does not load it
 
-    def table(self, part: str, rows: Iterable[Sequence[object]]) -> None:
-        """Write a table as CSV."""
-        from sagline.core.table import csv_text  # not loaded for the help
-
-        write_text(self.file(part), csv_text(rows))
+            found = rows()
+            write_text(self.file(part), csv_text(found.rows if isinstance(found, Table) else found))
 
     def draw(self, *figures: FigureMaker) -> None:
-        """Make figures in the chosen style, and save them under the checked names; both have the same order."""
+        """Make and save `figures` if figures are wanted. They have the order of their names."""
+        if not self._figures:
+            return
         from sagline.plot import save
 
         for make in figures:
-            with self._style.active():
+            with self._given.style.active():
                 figure, name = make(), self._figures.pop(0)
-            for suffix in self._formats:
+            for suffix in self._given.formats:
                 save(figure, self.file(f"{name}.{suffix}"))
 
-    def report(
-        self, record: Callable[[], Mapping[str, object]], verdict: str, tell: Callable[[], None], *, as_json: bool
-    ) -> None:
-        """Print `record` and files as JSON. Without `as_json`, print `verdict`, the lines of `tell`, and files."""
-        if as_json:
+    def report(self, record: Callable[[], Mapping[str, object]], verdict: str, tell: Callable[[], None]) -> None:
+        """Print `record` and files as JSON if JSON is wanted; otherwise `verdict`, what `tell` prints, and files."""
+        if self._given.as_json:
             show_json({**record(), "files": self.files})
         else:
             show_text(verdict, style="bold")
@@ -196,7 +200,7 @@ class Output:
             self.show()
 
     def show(self) -> None:
-        """Print the folder and the names of its files; a figure in several formats is printed once."""
+        """Print the folder and the names of the written files. Each figure is printed once with all its formats."""
         if not self.files:
             return
         suffixes: dict[str, list[str]] = {}

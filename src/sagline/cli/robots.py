@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +11,9 @@ import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.output import Output, TextTable, show_table, values_of
 from sagline.cli.terminal import show_json, show_text
+from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import file_stem
-
-if TYPE_CHECKING:
-    from sagline.core.arrays import Array
 
 WHOLE = {  # fields of the robot and their units
     "motion_pattern": "",
@@ -42,22 +39,12 @@ PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
 CABLES = "-cables.csv"
 
 
-def robots(
-    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
-    write_table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
-) -> None:
+def robots(files: opt.TableFiles = opt.TableFiles()) -> None:
     """List the preset robots."""
-    output = Output(folder, "robots", [".csv"] * write_table)
+    output = Output(files, "robots", (), (), ".csv")
     robots = [sl.load_robot(name) for name in sl.robot_names()]
-    if write_table:
-        sizes = [f"{what} {axis} [m]" for what in ("frame", "platform") for axis in "xyz"]
-        rows = [
-            [each.name, each.cable_count, each.motion_pattern, each.mass, *_frame(each), *_platform(each), each.source]
-            for each in robots
-        ]
-        output.table(".csv", [["robot", "cables", "motion", "mass [kg]", *sizes, "source"], *rows])
-    if as_json:
+    output.table(".csv", lambda: _sizes(robots))
+    if files.as_json:
         show_json([_short(robot) for robot in robots])
         return
     heads = ["robot", "cables", "motion", "mass [kg]", "frame [m]", "platform [m]"]
@@ -77,13 +64,8 @@ def robots(
     output.show()
 
 
-def show(
-    name: opt.RobotArgument,
-    folder: Annotated[opt.OutOption, opt.only_with("--csv")] = Path("output"),
-    write_table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
-) -> None:
-    """Show every value of a robot with its unit; assumed values are marked, with the reason. --csv writes the cables.
+def show(name: str = opt.ROBOT, files: opt.TableFiles = opt.TableFiles()) -> None:
+    """Show every value of a robot with its unit. Assumed values have a mark and a reason. --csv writes the cables.
 
     For example:
 
@@ -91,11 +73,10 @@ def show(
         sagline show own_robot.yaml --json
     """
     robot = sl.load_robot(name)
-    output = Output(folder, file_stem(robot.name), [CABLES] * write_table)
-    if write_table:
-        output.table(CABLES, _cables(robot))
+    output = Output(files, file_stem(robot.name), (), (), CABLES)
+    output.table(CABLES, lambda: _cables(robot))
     record = _record(robot)
-    if as_json:
+    if files.as_json:
         show_json(record)
         return
     assumed = f"; {len(robot.assumed)} values are assumed" if robot.assumed else ""
@@ -121,8 +102,20 @@ def show(
     output.show()
 
 
+def _sizes(robots: Sequence[sl.Robot]) -> list[list[object]]:
+    """Heads of the columns, then one row per robot."""
+    sizes = [f"{what} {axis} [m]" for what in ("frame", "platform") for axis in "xyz"]
+    return [
+        ["robot", "cables", "motion", "mass [kg]", *sizes, "source"],
+        *(
+            [each.name, each.cable_count, each.motion_pattern, each.mass, *_frame(each), *_platform(each), each.source]
+            for each in robots
+        ),
+    ]
+
+
 def _cables(robot: sl.Robot) -> list[list[object]]:
-    """The heads of the columns, then anchors, material and limits of each cable; cells of unknown values are empty."""
+    """Heads of the columns, then anchors, material and limits of each cable. Unknown values are empty cells."""
     heads = ["cable", *(f"{field} {axis} [{unit}]" for field, unit in ANCHORS.items() for axis in "xyz")]
     known = {field: np.asarray(value) for field in PER_CABLE if (value := _value(robot, field)) is not None}
     columns = [np.broadcast_to(value, robot.cable_count).tolist() for value in known.values()]
@@ -147,7 +140,7 @@ def _short(robot: sl.Robot) -> dict[str, Any]:
 
 
 def _frame(robot: sl.Robot) -> Array:
-    """Edge lengths of the frame. Without a frame, those of the box around the anchors and down to the floor."""
+    """Edge lengths of the frame. If unknown, those of the box that encloses the anchors and reaches to the floor."""
     if robot.frame_size is not None:
         return robot.frame_size
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
@@ -156,7 +149,7 @@ def _frame(robot: sl.Robot) -> Array:
 
 
 def _platform(robot: sl.Robot) -> Array:
-    """Edge lengths of the platform. If they are not given, edge lengths of the box that encloses its anchors."""
+    """Edge lengths of the platform. If unknown, those of the box that encloses its anchors."""
     extent: Array = np.ptp(robot.platform_anchors, axis=0)
     return extent if robot.platform_size is None else robot.platform_size
 
@@ -174,7 +167,7 @@ def _assumption(robot: sl.Robot, field: str) -> str | None:
 
 
 def _record(robot: sl.Robot) -> dict[str, Any]:
-    """All values with their units; `show` prints them, too."""
+    """All values of `robot` with their units."""
     from sagline.core.fields import units
     from sagline.robot.tolerances import UNCERTAIN
 
@@ -205,7 +198,7 @@ def _with_units(values: Mapping[str, Any], unit: Mapping[str, str]) -> dict[str,
 
 
 def _listing(entries: Mapping[str, Any], text: Callable[[str, Any], str], title: str, head: str = "value") -> TextTable:
-    """Table of the known values of a record, as texts; assumed values are marked."""
+    """Table of the known values in `entries`. Assumed values have a mark."""
     rows = [
         [_marked(name, entry), text(name, entry["value"]), entry["unit"]]
         for name, entry in entries.items()
@@ -219,7 +212,7 @@ def _marked(name: str, entry: Mapping[str, Any]) -> str:
 
 
 def _deviation_text(_: str, value: Array) -> str:
-    """Text of a standard deviation; a field with equal values has one number."""
+    """Standard deviations as text, with one number if all are equal."""
     if (value == value.flat[0]).all():
         return f"{value.flat[0]:.4g}"
     return "\n".join(_numbers(row, 4) for row in np.atleast_2d(value))
@@ -227,13 +220,14 @@ def _deviation_text(_: str, value: Array) -> str:
 
 def _winch_text(field: str, value: Any) -> str:
     if field == "swivel_axis":
-        ways = ["up" if axis[2] > 0.0 else "down" for axis in value]
+        words = {1.0: "up", -1.0: "down"}
+        ways = [words.get(axis[2], f"[{', '.join(f'{x:.4g}' for x in axis)}]") for axis in value]
         return f"({', '.join(ways)})" if len(set(ways)) > 1 else ways[0]
     return value if isinstance(value, str) else _spread(value, digits=9)  # counts need more digits than lengths
 
 
 def _spread(value: Array, digits: int = 5) -> str:
-    """One value if it is the same for all cables, otherwise all values."""
+    """Values of all cables as text, with one number if all are equal."""
     return f"{value[0]:.{digits}g}" if np.all(value == value[0]) else _numbers(value, digits)
 
 

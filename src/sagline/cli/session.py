@@ -1,4 +1,4 @@
-"""Session of `sagline control`: reads lines from an operator or a pipe while the controller runs its cycles."""
+"""Session of `sagline control`. It reads lines of an operator or a pipe while the controller runs its cycles."""
 
 from __future__ import annotations
 
@@ -17,10 +17,7 @@ import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.terminal import show_note, show_text
 from sagline.cli.values import quantity
-from sagline.control.controller import Controller
 from sagline.control.real_time import interrupt_calls
-from sagline.control.recording import Event, EventKind
-from sagline.control.states import State
 from sagline.core.arrays import Array
 from sagline.core.errors import nearest
 from sagline.files.pose_text import pose_of_text
@@ -33,11 +30,11 @@ AXES: Final = ("x", "y", "z")
 CONFIRM: Final = "--confirm"
 
 
-class StatusLine:
-    """Fixed last line of a terminal, below the lines that scroll; no effect if stdout is not a terminal."""
+class _StatusLine:
+    """Fixed last line of a terminal, below the lines that scroll. It has no effect if stdout is not a terminal."""
 
     def __init__(self, *, shown: bool) -> None:
-        """Use stdout if stdout is a terminal and `shown` is True."""
+        """Enable the line if `shown` is True and stdout is a terminal."""
         self._shown = shown and sys.stdout is not None and sys.stdout.isatty()
         self._next, self._size = 0.0, (0, 0)
 
@@ -85,22 +82,22 @@ class StatusLine:
         sys.stdout.flush()
 
 
-# text of a line ("" at the end of the input) and its action; for an invalid line, the action raises the error
+# text of a line ("" at the end of the input) and its action; the action of an invalid line raises the error
 _Line = tuple[str, Callable[[], object]]
 
 
 class OperatorSession:
     """Session that reads lines, runs the cycles of the controller, and prints events."""
 
-    def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
-        """Prepare a session. With `alone`, a line waits for the previous line. With `shadow`, nothing is sent."""
+    def __init__(self, controller: sl.control.Controller, *, alone: bool, shadow: bool) -> None:
+        """Prepare a session. If `alone`, a line waits until the previous line is done. If `shadow`, nothing is sent."""
         control = controller
         self.control, self._alone, self._shadow = controller, alone, shadow
         self._event_count = 0
         self._ended = self._is_interrupted = False
         self._wait = 0  # number of cycles until the next line is read
         self._lines: SimpleQueue[_Line] = SimpleQueue()
-        self._line = StatusLine(shown=not alone)
+        self._line = _StatusLine(shown=not alone)
         # for each command: its arguments, its help, the parser of its arguments, and its action
         self._words: dict[str, tuple[str, str, Callable[[str], Any], Callable[..., object]]] = {
             "home": (
@@ -141,11 +138,11 @@ class OperatorSession:
         finally:
             with interrupt_calls(lambda: None):
                 self._disconnect()
-        return FAILED if self.control.state is State.EMERGENCY or self._failed else 0
+        return FAILED if self.control.state is sl.control.State.EMERGENCY or self._failed else 0
 
     @property
     def _failed(self) -> bool:
-        return self._alone and any(event.state is State.FAULT for event in self.control.events)
+        return self._alone and any(event.state is sl.control.State.FAULT for event in self.control.events)
 
     def _begin(self) -> None:
         if self._shadow:
@@ -166,7 +163,7 @@ class OperatorSession:
         self._lines.put(("", self._end))
 
     def _parse(self, text: str) -> _Line:
-        """Parse a line; for an invalid line, the returned action raises the error."""
+        """Parse a line. The action of an invalid line raises the error."""
         word, _, rest = text.partition(" ")
         if not word or word.startswith("#"):
             return "", lambda: None
@@ -194,7 +191,7 @@ class OperatorSession:
         control.stop()
         while control.moving:
             control.cycle()
-        if control.state not in (State.OFF, State.EMERGENCY):
+        if control.state not in (sl.control.State.OFF, sl.control.State.EMERGENCY):
             control.off()
         self._show_events()
         pace = control.pace
@@ -209,10 +206,10 @@ class OperatorSession:
         self._line.update(self._status)
 
     def _next_line(self) -> _Line | None:
-        """The next line. An operator's line is returned immediately, a line of a pipe when the platform is at rest."""
+        """The next line, or None. A line of a pipe is only returned when the platform is at rest."""
         if self._wait or (self._alone and self.control.moving):
             return None
-        if self._alone and self.control.state in (State.FAULT, State.EMERGENCY):
+        if self._alone and self.control.state in (sl.control.State.FAULT, sl.control.State.EMERGENCY):
             self._end()
             return None
         try:
@@ -221,7 +218,7 @@ class OperatorSession:
             return None
 
     def _carry_out(self, text: str, act: Callable[[], object]) -> None:
-        """Carry out a line. An error of an operator's line is printed. An error in a pipe ends the session."""
+        """Carry out a line. An error in a line of an operator is printed. An error in a line of a pipe is raised."""
         if self._alone and text:
             show_text(f"{PROMPT}{text}", whole=True)
         try:
@@ -334,6 +331,6 @@ def _refuse(error: sl.SaglineError) -> None:
     raise error
 
 
-def _event_text(event: Event) -> str:
-    name = f"{event.name}: " if event.kind is not EventKind.NOTE else ""
+def _event_text(event: sl.control.Event) -> str:
+    name = f"{event.name}: " if event.kind is not sl.control.EventKind.NOTE else ""
     return f"{event.time:9.2f} s  {name}{event.text}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
 import sagline as sl
 from sagline.cli import options as opt
@@ -19,21 +19,19 @@ HEAD: Final = 2000  # number of bytes at the start of a page that contain its ma
 
 
 def share(
-    what: Annotated[
-        str,
-        opt.argument(
-            "WHAT",
-            "A run or a simulation, run.nc, or a log of the controller, run.mcap: the page plays it. A preset (see "
-            "sagline robots) or a robot file, robot.yaml: the platform can be dragged.",
-            opt.robot_completions,
-        ),
-    ],
-    out: Annotated[Path | None, opt.out_option("run.html or ROBOT.html here")] = None,
+    what: str = opt.argument(
+        opt.NEEDED,
+        "WHAT",
+        "A run or a simulation (run.nc) or a log of the controller (run.mcap), which the page plays; or a preset (see "
+        "sagline robots) or a robot file (robot.yaml), whose platform can be dragged.",
+        completion=opt.robot_completions,
+    ),
+    out: Path | None = opt.out(None, "run.html or ROBOT.html here"),
 ) -> None:
-    """Write a robot or a run as one HTML page that needs no server and no network: for a phone, a mail, a lecture.
+    """Write a robot or a run as one HTML page for a phone, a mail or a lecture. It needs no server and no network.
 
-    The page plays a run, or lets the platform of a robot be dragged; it contains the kernels. Mouse, touch and keys
-    rotate the view. The file has about 160 kB, and 150 kB more for each minute of a run.
+    The page plays a run; in the page of a robot, the platform can be dragged. The page contains the kernels. Mouse,
+    touch and keys rotate the view. The file has about 160 kB, and 150 kB more for each minute of a run.
 
     For example:
 
@@ -64,11 +62,11 @@ def share(
 
 
 def _found(source: Path) -> sl.Robot | SharedMotion:
-    """The robot of the argument, or the run to play."""
+    """The robot or the run in `source`."""
     from sagline.files.calibration_file import FORMAT as CALIBRATION
     from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT as SIMULATION
-    from sagline.share.course import of_plan, of_simulation
+    from sagline.share.course import SharedMotion
 
     suffix = source.suffix.lower()
     if suffix == ".mcap":
@@ -76,30 +74,30 @@ def _found(source: Path) -> sl.Robot | SharedMotion:
     if suffix != ".nc":
         return sl.load_robot(str(source))
     if is_of(source, SIMULATION):
-        return of_simulation(sl.load_simulation(source))
+        return SharedMotion.of_simulation(sl.load_simulation(source))
     if is_of(source, CALIBRATION):
         return sl.load_calibration(source).robot
     plan = sl.load_plan(source)
     if not plan.state.pose.shape:
         step = "Save a plan of a path, or share the robot."
         raise sl.InvalidValueError("run", "a plan of a single pose", "a plan of a sequence of poses", step)
-    return of_plan(plan)
+    return SharedMotion.of_plan(plan)
 
 
 def _log(source: Path) -> SharedMotion:
     try:
-        from sagline.share.course import of_session
+        from sagline.share.course import SharedMotion
         from sagline.viewer.session import LogFollower
     except ModuleNotFoundError as error:
         raise sl.FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None
     session = LogFollower(source).more()
     if session is None:
         raise sl.FileError(source, "has no cycle", "Record at least one cycle.")
-    return of_session(session)
+    return SharedMotion.of_session(session)
 
 
 def _free(file: Path) -> Path:
-    """The default file; FileError if it exists and is not a page of sagline."""
+    """Check `file`, the default file. FileError if it exists and is not a page of sagline."""
     from sagline.share.page import MADE
 
     check_file(file)

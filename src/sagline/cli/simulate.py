@@ -6,14 +6,14 @@ import re
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
 from sagline.cli.tension import reason
 from sagline.cli.terminal import ProgressLine, show_note, show_text, working
-from sagline.cli.track import check_unit
+from sagline.cli.track import load_path_near
 from sagline.files.writing import file_stem
 
 if TYPE_CHECKING:
@@ -38,57 +38,56 @@ class _CableMass(StrEnum):
     MODAL = "modal"
 
 
-BREAK = re.compile(r"([0-9]{1,3})@([^@]+)")
-EVENT = ("time_s", "kind", "cable", "tension_before_n", "tension_after_n")
+class _Winches(StrEnum):
+    """Models of winches."""
+
+    IDEAL = "ideal"
+    ROBOT = "robot"
+
+
+BREAK = re.compile(r"([0-9]{1,3})@([^@]+)(?:@([^@]+))?")
+EVENT = ("time_s", "kind", "cable", "tension_before_n", "tension_after_n", "limit")
 STEP = "Give the cable and the time of the break: --break 3@2.5s."
 
 
-_PathOption = Annotated[
-    Path | None,
-    opt.argument("PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the platform is at rest at --pose."),
-]
-_ShaperOption = Annotated[
-    _ShaperKind, opt.choice("SHAPER", "Input shaper of the path", _ShaperKind), opt.only_with("PATH")
-]
-_BreaksOption = Annotated[
-    list[str] | None,
-    opt.option(
-        "CABLE@TIME", "Cable and time of a break: 3@2.5s means cable 3 at 2.5 s. The option can be repeated.", "--break"
-    ),
-]
-_StepOption = Annotated[
-    float | None,
-    opt.quantity("TIME", "Time step of the integrator [s]. Default: a step that suits the robot.", "s", above=0.0),
-]
+_BREAKS: list[str] | None = opt.option(
+    None,
+    "CABLE@TIME[@POSITION]",
+    "Cable and time of a break: 3@2.5s means cable 3 at 2.5 s. POSITION is 0 at the frame end and 1 at the "
+    "platform end (default), for --cable-mass lumped. The option can be repeated.",
+    "--break",
+)
 
 
 def simulate(
-    name: opt.RobotArgument,
-    path: _PathOption = None,
-    pose: Annotated[opt.PoseOption, opt.only_without("PATH")] = None,
-    shaper: _ShaperOption = _ShaperKind.NONE,
-    cable_mass: Annotated[_CableMass, opt.choice("KIND", "Model of the cable mass", _CableMass)] = _CableMass.NONE,
-    breaks: _BreaksOption = None,
-    after: Annotated[float, opt.quantity("TIME", "Simulated time after the end of the path [s].", "s", low=0.0)] = 3,
-    step: _StepOption = None,
-    tension: opt.TensionOption = opt.Tension.CLOSEST,
-    loss_time: opt.LossTimeOption = None,
-    air_damping: opt.AirDampingOption = 0,
-    wrench: opt.WrenchOption = None,
-    payload: opt.PayloadOption = None,
-    folder: opt.OutOption = Path("output"),
-    figures: opt.FiguresOption = True,
-    formats: opt.FormatsOption = opt.USUAL_FORMATS,
-    style: opt.StyleOption = opt.FigureStyle.PLAIN,
-    write_table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
+    name: str = opt.ROBOT,
+    path: Path | None = opt.argument(
+        None, "PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the platform is at rest at --pose."
+    ),
+    pose: Any = opt.if_only(opt.POSE, opt.only_without("PATH")),
+    shaper: _ShaperKind = opt.choice(
+        _ShaperKind.NONE, "SHAPER", "Input shaper of the path", _ShaperKind, opt.only_with("PATH")
+    ),
+    cable_mass: _CableMass = opt.choice(_CableMass.NONE, "KIND", "Model of the cable mass", _CableMass),
+    winches: _Winches = opt.choice(_Winches.IDEAL, "WINCHES", "Model of the winches", _Winches),
+    breaks: list[str] | None = _BREAKS,
+    after: float = opt.quantity(3, "TIME", "Simulated time after the end of the path [s].", "s", low=0.0),
+    step: float | None = opt.quantity(
+        None, "TIME", "Time step of the integrator [s]. Default: a step that suits the robot.", "s", above=0.0
+    ),
+    tension: str = opt.TENSION,
+    loss_time: float | None = opt.LOSS_TIME,
+    air_damping: float = opt.AIR_DAMPING,
+    wrench: Any = opt.WRENCH,
+    payload: float | None = opt.PAYLOAD,
+    files: opt.Files = opt.Files(),
 ) -> int:
     """Simulate the motion of a robot along a path, with vibration, input shapers and breaking cables.
 
     The lengths are planned as by `sagline track`. The result has the largest tension, the residual vibration at the
-    end, the energy balance and the events. Figures show the tensions, the motion and the energy balance. The default
-    of --loss-time is 1 ms if a cable breaks (as in the viewer), otherwise 0. To play the result in the browser, use
-    `sagline view ROBOT FILE`.
+    end, the energy balance and the events. Figures show the tensions, the motion and the energy balance. If a
+    cable breaks, the default of --loss-time is 1 ms, as in the viewer; otherwise it is 0. With --winches robot, an
+    event has the active limit of a motor: torque or speed. `sagline view ROBOT FILE` plays the result in the browser.
 
     For example:
 
@@ -102,32 +101,30 @@ def simulate(
     robot = opt.robot_with_payload(name, payload)
     events = tuple(_break(text, robot) for text in breaks or ())
     damping = sl.Damping(loss_time or 0.0, air_damping)
-    stem, parts = file_stem(robot.name, "simulation"), [".nc", *[".csv"] * write_table]
-    output = Output(folder, stem, parts, ["-motion", "-energy"] if figures else [], formats, style)
-    way = None if path is None else sl.load_path(path)
-    if path is not None and way is not None:
-        check_unit(path, way, robot)
-    method = tension.build(opt.TensionVariable.CHORD)
+    output = Output(files, file_stem(robot.name, "simulation"), [".nc"], ["-motion", "-energy"], ".csv")
+    way = None if path is None else load_path_near(robot, path)
+    method = opt.tension_named(tension)
     with working(f"{robot.name}: simulating") as line:
         start = _start(robot, way, pose, method, shaper, cable_mass, wrench, line)
         end = after if way is None else _duration(start) + after
         line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass.value)}")
         kind: Any = cable_mass.value
+        drives: Any = winches.value
         if events and loss_time is None:
             given = initial_conditions(start, None, None, end)
             assumed = losses_after_break(given, NODES if cable_mass is _CableMass.LUMPED else 0)
             damping = sl.Damping(assumed.loss_time, air_damping)
-        simulation = sl.simulate(start, duration=end, step=step, cable_mass=kind, events=events, damping=damping)
+        simulation = sl.simulate(
+            start, duration=end, step=step, cable_mass=kind, winches=drives, events=events, damping=damping
+        )
         simulation.save(output.file(".nc"))
-        if write_table:
-            output.table(".csv", simulation.table().rows)
-        if figures:
-            line.stage("drawing")
-            output.draw(lambda: sl.plot.simulation(simulation), lambda: sl.plot.energy(simulation))
+        output.table(".csv", simulation.table)
+        line.stage("drawing")
+        output.draw(lambda: sl.plot.simulation(simulation), lambda: sl.plot.energy(simulation))
     summary = summary_of(simulation)
     assert summary is not None
     record = {"robot": robot.name, **summary.json, "events": [values_of(event, *EVENT) for event in simulation.events]}
-    output.report(lambda: record, _verdict(simulation, summary), partial(_tell, simulation, summary), as_json=as_json)
+    output.report(lambda: record, _verdict(simulation, summary), partial(_tell, simulation, summary))
     return 0
 
 
@@ -140,7 +137,8 @@ def _break(text: str, robot: sl.Robot) -> sl.Break:
     cable, time = int(found[1]), quantity(found[2], "--break", "s", low=0.0)
     if cable >= robot.cable_count:
         raise sl.InvalidValueError("--break", f"cable {cable}", f"0 to {robot.cable_count - 1}", STEP)
-    return sl.Break(cable=cable, time=time)
+    position = 1.0 if found[3] is None else quantity(found[3], "--break", "", low=0.0)
+    return sl.Break(cable=cable, time=time, position=position)
 
 
 def _start(
@@ -153,7 +151,7 @@ def _start(
     load: Array | None,
     line: ProgressLine,
 ) -> sl.Plan | sl.Equilibrium:
-    """The plan of the path, after input shaping if a shaper is chosen; without a path, the plan of one pose at rest."""
+    """The plan of the path `way` after input shaping. Without a path, the equilibrium at rest at `pose`."""
     if way is None:
         place = opt.middle_pose(robot) if pose is None else pose
         plan = sl.inverse(robot, place, tension=method, wrench=load)
@@ -181,7 +179,7 @@ def _duration(start: sl.Plan | sl.Equilibrium) -> float:
 
 
 def _verdict(simulation: sl.Simulation, summary: Summary) -> str:
-    """Text of the largest tension, and of the cables whose tension exceeds the limit."""
+    """Sentence with the largest tension, and with the cables whose tension exceeds the limit."""
     rows = {row.key: row for row in summary.rows}
     above = rows["cables_above_tension_max"]
     limits = f"above tension_max: {above.text}" if above.value else "all cables stay below tension_max"
@@ -192,6 +190,5 @@ def _tell(simulation: sl.Simulation, summary: Summary) -> None:
     rows = [[row.label, row.text] for row in summary.rows if row.text]
     show_table(TextTable(["", simulation.robot.name], rows, left=frozenset({0, 1})))
     for event in simulation.events:
-        what = event.kind if event.cable is None else f"{event.kind} of cable {event.cable}"
         before, after = (number_text(value, ",.1f") for value in (event.tension_before, event.tension_after))
-        show_text(f"{event.time:.3f} s: {what}, {before} N before, then at most {after} N")
+        show_text(f"{event.time:.3f} s: {event.text}, {before} N before, then at most {after} N")

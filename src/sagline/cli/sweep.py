@@ -1,4 +1,4 @@
-"""`sagline sweep`: the computation of many robots, poses and wrenches, whose results are stored in a folder."""
+"""`sagline sweep`: results of many robots, poses and wrenches, stored in a folder."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated
 
 import sagline as sl
 from sagline.cli import options as opt
@@ -15,9 +14,6 @@ from sagline.cli.output import Output, TextTable, number_text, show_table, value
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.numbers import counted
 from sagline.files.writing import create_folder
-
-if TYPE_CHECKING:
-    from sagline.sweep.result import Sweep
 
 ENDS = {
     "feasible": "tensions within their limits",
@@ -29,20 +25,17 @@ ENDS = {
 
 
 def sweep(
-    file: Annotated[
-        Path, opt.argument("SWEEP.yaml", "File with robots, poses, wrenches and the quantities to compute.")
-    ],
-    out: Annotated[Path | None, opt.out_option("SWEEP in output")] = None,
-    workers: Annotated[
-        str | None,
-        opt.option("COUNT", "Processes on this machine. Default: one per processor."),
-        opt.only_without("--scheduler"),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        opt.option("tcp://HOST:PORT", "Use the workers of this Dask scheduler; all workers need access to the folder."),
-    ] = None,
-    as_json: opt.JsonOption = False,
+    file: Path = opt.argument(
+        opt.NEEDED, "SWEEP.yaml", "File with robots, poses, wrenches and the quantities to compute."
+    ),
+    out: Path | None = opt.out(None, "SWEEP in output"),
+    workers: str | None = opt.option(
+        None, "COUNT", "Processes on this machine. Default: one per processor.", opt.only_without("--scheduler")
+    ),
+    scheduler: str | None = opt.option(
+        None, "tcp://HOST:PORT", "Use the workers of this Dask scheduler. All workers need access to the folder."
+    ),
+    as_json: bool = opt.JSON,
 ) -> int:
     """Compute tensions, lengths or shortfalls of every robot at every pose under every wrench.
 
@@ -60,7 +53,7 @@ def sweep(
     count = None if workers is None else opt.whole_of(workers, "--workers", 1, MOST_WORKERS)
     request = sl.load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
-    Output(folder, "", ["done"])  # `Outputs` raises an error if the folder cannot be written
+    Output(opt.DataFiles(folder, table=False), "", ["done"])  # raises an error if the folder cannot be written
     parent = folder.absolute().parent
     made = [place for place in (parent, *parent.parents) if not place.exists()]
     create_folder(parent)
@@ -79,7 +72,7 @@ def sweep(
     except sl.SaglineError as error:
         if (folder / "done").exists():
             error.add_note(f"The finished tasks are kept. To continue: {again}")
-        with suppress(OSError):  # the sweep has requests
+        with suppress(OSError):  # a folder is not removed if it contains results
             for place in made:
                 place.rmdir()
         raise
@@ -101,7 +94,7 @@ def _again(file: Path, folder: Path, workers: str | None, scheduler: str | None)
     return " ".join(map(quote, words))
 
 
-def _show(found: Sweep) -> None:
+def _show(found: sl.sweep.Sweep) -> None:
     total = len(found.request)
     counts = found.counts._asdict()
     rows = [
@@ -115,7 +108,7 @@ def _show(found: Sweep) -> None:
     show_text(f"In {found.folder.resolve()}: read with sl.sweep.load({str(found.folder)!r})", whole=True)
 
 
-def _record(found: Sweep) -> dict[str, object]:
+def _record(found: sl.sweep.Sweep) -> dict[str, object]:
     sizes = dict(zip(("robots", "poses", "wrenches"), found.request.shape, strict=True))
     request = {"folder": found.folder, **sizes, "quantities": found.request.quantities}
     return {**request, **values_of(found, "tasks", "seconds"), **found.counts._asdict()}

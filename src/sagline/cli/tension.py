@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,33 +11,27 @@ from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_note, show_text
+from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import file_stem
 
-if TYPE_CHECKING:
-    from sagline.core.arrays import Array
-
+TABLE = "-tensions.csv"
 LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at a single pose, they give the tensions of other methods
 
 
 def tension(
-    name: opt.RobotArgument,
-    pose: opt.PoseOption = None,
-    model: opt.ModelOption = opt.ModelName.CATENARY,
-    variable: opt.VariableOption = opt.TensionVariable.CHORD,
-    wrench: opt.WrenchOption = None,
-    payload: opt.PayloadOption = None,
-    folder: opt.OutOption = Path("output"),
-    figures: opt.FiguresOption = True,
-    formats: opt.FormatsOption = opt.USUAL_FORMATS,
-    style: opt.StyleOption = opt.FigureStyle.PLAIN,
-    table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
+    name: str = opt.ROBOT,
+    pose: Any = opt.POSE,
+    model: str = opt.MODEL,
+    variable: opt.TensionVariable = opt.VARIABLE,
+    wrench: Any = opt.WRENCH,
+    payload: float | None = opt.PAYLOAD,
+    files: opt.Files = opt.Files(),
 ) -> int:
     """Compare nine tension distribution methods at one pose, and draw their tensions into the tension polygon.
 
-    Three methods are left out, because at a single pose they give the tensions of others: Closest and QuadraticProgram
-    those of MinimumNorm; PolygonWalk those of LowestSum, MinimumNorm or Centroid.
+    Three methods are left out, because at a single pose their tensions are those of other methods. Closest and
+    QuadraticProgram give the tensions of MinimumNorm. PolygonWalk gives those of LowestSum, MinimumNorm or Centroid.
 
     For example:
 
@@ -46,24 +39,23 @@ def tension(
         sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
     from sagline.robot.reach import is_underconstrained
-    from sagline.tension.methods import METHODS
+    from sagline.tension.methods import methods_by_name
 
     robot = opt.robot_with_payload(name, payload)
     place = opt.middle_pose(robot) if pose is None else pose
-    drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
-    parts = ["-tensions.csv"] * table
-    output = Output(folder, file_stem(robot.name), parts, ["-tension"] * drawn, formats, style)
+    drawn = files.figures and robot.cable_count == robot.degrees_of_freedom + 2
+    output = Output(files, file_stem(robot.name), (), ["-tension"] * drawn, TABLE)
     least = sl.inverse(
-        robot, place, model.build(), sl.MinimumNorm(variable.value), wrench
+        robot, place, model, sl.MinimumNorm(variable.value), wrench
     )  # raises an error if no method is defined for the robot
     fewer_cables = is_underconstrained(robot)
     plans: dict[str, sl.Plan | None] = {"balance": least}
     if not fewer_cables:
-        methods = {title: method for title, method in METHODS.items() if title not in LEFT_OUT}
+        methods = {title: method for title, method in methods_by_name().items() if title not in LEFT_OUT}
         plans = {title: _plan(robot, place, model, method(variable.value), wrench) for title, method in methods.items()}
     why = reason(robot, place, least)
     margin = None if fewer_cables else float(sl.capacity_margin(least.state))
-    shape = sl.tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
+    shape = sl.tension_polygon(robot, place, model, wrench, variable.value) if drawn else None
     for text in least.warnings:
         show_note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):
@@ -72,8 +64,7 @@ def tension(
     if shape is not None:
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
         output.draw(lambda: sl.plot.polygon(shape, points))
-    for part in parts:
-        output.table(part, _rows(robot, plans))
+    output.table(TABLE, lambda: _rows(robot, plans))
     tensions = {title: _record(plan) for title, plan in plans.items()}
 
     def tell() -> None:
@@ -86,22 +77,20 @@ def tension(
     verdict = f"{robot.name}: {count} of {len(plans)} methods have tensions within the limits."
     if fewer_cables:
         verdict = f"{robot.name}: the balance of the underconstrained platform determines all tensions."
-    output.report(lambda: {"capacity_margin": margin, "tensions": tensions}, verdict, tell, as_json=as_json)
+    output.report(lambda: {"capacity_margin": margin, "tensions": tensions}, verdict, tell)
     return 0
 
 
-def _plan(
-    robot: sl.Robot, pose: sl.Pose, model: opt.ModelName, method: sl.TensionMethod, wrench: Array | None
-) -> sl.Plan | None:
+def _plan(robot: sl.Robot, pose: sl.Pose, model: str, method: sl.TensionMethod, wrench: Array | None) -> sl.Plan | None:
     """The plan of a method; None if the method is not defined for the robot."""
     try:
-        return sl.inverse(robot, pose, model.build(), method, wrench)
+        return sl.inverse(robot, pose, model, method, wrench)
     except sl.InvalidValueError:
         return None
 
 
 def reason(robot: sl.Robot, pose: sl.Pose, plan: sl.Plan) -> str:
-    """Sentence on an infeasible pose: its shortfall and limiting cables, or the motion that no cable resists."""
+    """Reason why a pose is infeasible: shortfall and limiting cables, or the motion that no cable resists."""
     status = sl.PoseStatus(int(plan.status))
     if status is sl.PoseStatus.SINGULAR:
         return f"{status.text}. No cable resists {sl.unresisted_motion(robot, pose).text}"

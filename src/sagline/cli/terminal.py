@@ -1,4 +1,4 @@
-"""Output of the commands: results on stdout, notes on stderr; control characters in texts are removed."""
+"""Output of the commands: results on stdout, notes on stderr. Control characters in texts are removed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console, RenderableType
@@ -32,15 +32,15 @@ _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 class ProgressLine:
-    """One line that is updated on a terminal; no effect outside a terminal."""
+    """One line of a terminal that is updated. Without a terminal, it has no effect."""
 
     def __init__(self, bar: Progress, what: str) -> None:
-        """Add the work to a progress bar; the bar is disabled outside a terminal."""
+        """Add the work `what` to a progress bar."""
         self._bar = bar
         self._task = bar.add_task(printable(what), total=None)
 
     def stage(self, what: str) -> ProgressCallback:
-        """Begin a new part of the work; returns the function that reports the progress of this part."""
+        """Begin a new part of the work. Returns the function that reports the progress of this part."""
         self._bar.reset(self._task, total=None, description=printable(what))
         return self.progress
 
@@ -53,14 +53,9 @@ class ProgressLine:
         self._bar.update(self._task, description=printable(what))
 
 
-def working(what: str) -> AbstractContextManager[ProgressLine]:
-    """Show the work and its progress on a terminal inside the `with` block."""
-    return progress_line(_err, what)
-
-
 @contextmanager
-def progress_line(console: Console, what: str) -> Iterator[ProgressLine]:
-    """Show a progress line while inside: the name of the work, and the remaining time if the work is long."""
+def working(what: str, console: Console = _err) -> Iterator[ProgressLine]:
+    """Show the name `what` of the work inside the `with` block; for long work, show the remaining time too."""
     from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
 
     class Late(ProgressColumn):
@@ -104,13 +99,13 @@ def notices() -> Iterator[None]:
 
 
 def show_note(head: str, text: str, style: str = "") -> None:
-    """Print one line on stderr; a path in the line is not broken."""
+    """Print one line on stderr. The terminal does not break a path in the line."""
     with suppress(OSError):  # if stderr is closed, the message is lost
         _err.print(Text.assemble((printable(head), style), printable(text).replace(SPACE, " ")), soft_wrap=True)
 
 
 def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
-    """Print a part of the result. Long lines are broken between words; with `whole`, they are not (for paths)."""
+    """Print a part of the result. Long lines are broken between words, except if `whole`, which is meant for paths."""
     if whole:
         _emit(Text(printable(what), style))
     else:
@@ -119,19 +114,19 @@ def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = Fals
 
 
 def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
-    """Print parts of the result. `pieces` makes them for a width, and gives the smallest width of each part."""
+    """Print parts of the result. `pieces` returns the parts for a width, each with its smallest width."""
     console = _out if _out.is_terminal else _wide
     for piece, least in pieces(console, console.width):
         _emit(piece, max(console.width, least))
 
 
 def show_json(what: Any) -> None:
-    """Print the result as one JSON document, for programs; null replaces numbers that are not finite."""
+    """Print the result as one JSON document, for programs. null replaces numbers that are not finite."""
     _write("".join(c if _fits(c) else json.dumps(c)[1:-1] for c in json_text(what)) + "\n")
 
 
 def show_data(text: str) -> None:
-    """Print the text of a file in UTF-8; on a terminal, control characters are removed."""
+    """Print the text of a file in UTF-8. On a terminal, control characters are removed."""
     if sys.stdout is None or sys.stdout.isatty():
         _write(printable(text, "\n\t"))
         return
@@ -151,7 +146,7 @@ def _fits(character: str) -> bool:
 
 
 def _emit(what: RenderableType, width: int | None = None) -> None:
-    """Print with lines of a width; with None, lines are not broken."""
+    """Print `what` with lines of `width`. If `width` is None, lines are not broken."""
     console = _out if _out.is_terminal else _wide
     with _refused(), console.capture() as captured:
         console.print(what, width=width, soft_wrap=width is None, crop=False)
@@ -159,7 +154,7 @@ def _emit(what: RenderableType, width: int | None = None) -> None:
 
 
 def _write(text: str) -> None:
-    """Write to stdout; only this function and `show_data` do so."""
+    """Write to stdout. Only this function and `show_data` write to stdout."""
     with _refused():
         sys.stdout.write(text.encode(_encoding(), "backslashreplace").decode(_encoding()))
         sys.stdout.flush()
@@ -167,7 +162,7 @@ def _write(text: str) -> None:
 
 @contextmanager
 def _refused() -> Iterator[None]:
-    """Convert the system's errors of stdout to FileError, except for BrokenPipeError (no reader)."""
+    """Convert an OSError of stdout to a FileError, except for BrokenPipeError, raised without a reader."""
     try:
         if sys.stdout is None:
             raise OSError(errno.EBADF, "it is closed")
@@ -179,7 +174,7 @@ def _refused() -> Iterator[None]:
 
 
 def unwritable(error: OSError) -> FileError:
-    """The error of a stdout that cannot be written."""
+    """FileError for a stdout that cannot be written."""
     reason = "it is closed" if error.errno == errno.EBADF else error.strerror or error
     return FileError(
         "standard output", f"cannot be written ({reason})", "Give it a file with space, a pipe or a terminal."

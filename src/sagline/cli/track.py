@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from time import perf_counter
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,28 +24,22 @@ FIGURES = ("path", "velocity", "cables", "error")
 
 
 def track(
-    robot: opt.RobotArgument,
-    path: Annotated[
-        Path | None,
-        opt.argument("PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the article's path."),
-    ] = None,
-    model: opt.ModelOption = opt.ModelName.CATENARY,
-    tension: opt.TensionOption = opt.Tension.CLOSEST,
-    variable: opt.VariableOption = opt.TensionVariable.CHORD,
-    wrench: opt.WrenchOption = None,
-    payload: opt.PayloadOption = None,
-    folder: opt.OutOption = Path("output"),
-    figures: opt.FiguresOption = True,
-    formats: opt.FormatsOption = opt.USUAL_FORMATS,
-    style: opt.StyleOption = opt.FigureStyle.PLAIN,
-    table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
+    robot: str = opt.ROBOT,
+    path: Path | None = opt.argument(
+        None, "PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the article's path."
+    ),
+    model: str = opt.MODEL,
+    tension: str = opt.TENSION,
+    variable: opt.TensionVariable = opt.VARIABLE,
+    wrench: Any = opt.WRENCH,
+    payload: float | None = opt.PAYLOAD,
+    files: opt.Files = opt.Files(),
 ) -> int:
     """Plan the cable lengths of a robot along a path, and confirm them with exact catenaries.
 
-    The confirmation gives exact catenaries the lengths of the chosen model, and finds the equilibrium of the platform.
-    The position error is the distance of this equilibrium from the planned pose. The plan is written to
-    DIR/ROBOT-MODEL.nc; --csv also writes poses, lengths and tensions as a table.
+    The lengths are computed with the chosen cable model. The confirmation finds the equilibrium of the platform on
+    exact catenaries of these lengths. The position error is the distance of this equilibrium from the planned pose.
+    The plan is written to DIR/ROBOT-MODEL.nc. --csv also writes poses, lengths and tensions as a table.
 
     For example:
 
@@ -54,27 +48,21 @@ def track(
         sagline track cogiro own_samples.csv --payload 20 --csv
     """
     machine = opt.robot_with_payload(robot, payload)
-    way = sl.article_path() if path is None else sl.load_path(path)
-    if path is not None:
-        check_unit(path, way, machine)
-    cable = model.build()
-    name = run_name(machine, cable)
-    drawn = [f"-{figure}" for figure in FIGURES if figures]
-    output = Output(folder, name, [".nc", *[".csv"] * table], drawn, formats, style)
-    method = tension.build(variable)
+    way = sl.article_path() if path is None else load_path_near(machine, path)
+    cable = opt.model_named(model)
+    output = Output(files, run_name(machine, cable), [".nc"], [f"-{figure}" for figure in FIGURES], ".csv")
     with working(f"{machine.name}: planning and confirming {len(way):,} poses") as line:
-        run = run_along(machine, way, cable, method, line, wrench)
+        run = ConfirmedRun.along(machine, way, cable, opt.tension_named(tension, variable), line, wrench)
     with working("writing"):
         run.plan.save(output.file(".nc"))
-        if table:
-            output.table(".csv", run.plan.table().rows)
-        if figures:
-            output.draw(*_figures(run))
-    return tell([run], output, as_json=as_json)
+        output.table(".csv", run.plan.table)
+        output.draw(*_figures(run))
+    return tell([run], output)
 
 
-def check_unit(file: Path, way: sl.Path, robot: sl.Robot) -> None:
-    """Raise FileError if a path is so far from the robot that its numbers are probably in another unit."""
+def load_path_near(robot: sl.Robot, file: Path) -> sl.Path:
+    """Load a path. FileError if it is so far from `robot` that its numbers are probably in another unit."""
+    way = sl.load_path(file)
     size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
     away = np.linalg.norm(way.pose.position - robot.frame_anchors.mean(axis=0), axis=1)
     k = int(np.argmax(away))
@@ -83,10 +71,11 @@ def check_unit(file: Path, way: sl.Path, robot: sl.Robot) -> None:
             f"leads {away[k]:.4g} m away from {robot.name}, whose frame measures {size:.3g} m, at {way.time[k]:g} s"
         )
         raise sl.FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
+    return way
 
 
 def _figures(run: ConfirmedRun) -> tuple[FigureMaker, ...]:
-    """The figures, in the order of FIGURES."""
+    """Functions that draw the figures, in the order of `FIGURES`."""
     way = run.plan.path
     assert way is not None
     return (
@@ -109,8 +98,8 @@ ROWS = {  # rows of a summary: the label and the number format
     "feasible_share_percent": ("feasible poses [%]", ".4g"),
     "inverse_us_per_pose": ("inverse kinematics [µs per pose]", ".2f"),
 }
-WIDE, NARROW = 30, 16  # largest widths of the robot and of the tension method in a column's head, in characters
-LONGEST = "unstrained_length_max_m"  # smaller position errors are printed as zero, because lengths have rounding errors
+WIDE, NARROW = 30, 16  # largest widths of the names of robot and tension method in a column's head, in characters
+LONGEST = "unstrained_length_max_m"  # size relative to which a position error is rounding
 MOST_GAPS = 5  # largest number of infeasible parts of a path that are printed
 WIDEN = " Move the path, or widen the tension limits."
 SAME_PLACE = (
@@ -137,43 +126,44 @@ class ConfirmedRun(NamedTuple):
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
         return int(np.sum(self.plan.feasible & ~stays))
 
+    @classmethod
+    def along(
+        cls,
+        robot: sl.Robot,
+        path: sl.Path,
+        model: sl.CableModel,
+        tension: sl.TensionMethod,
+        line: ProgressLine,
+        wrench: Array | None = None,
+    ) -> ConfirmedRun:
+        """Plan a path, and confirm the plan with exact cables."""
+        # load the compiled kernels before the time is measured
+        sl.inverse(robot, path.pose[:1], model, tension, wrench)
+        start = perf_counter()
+        progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
+        plan = sl.inverse(robot, path, model, tension, wrench, progress=progress)
+        seconds = perf_counter() - start
+        return cls(sl.confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
+
+    def summary(self) -> dict[str, float]:
+        """Numbers of the feasible poses, by the keys of `ROWS`. They are NaN if no pose is feasible."""
+        plan = self.plan
+        error = 1e3 * np.linalg.norm(self.confirmation.position_error, axis=-1)
+        known = error[~np.isnan(error)]
+        numbers = (
+            *((float(known.max()), float(known.mean())) if known.size else (np.nan, np.nan)),
+            *_range(plan.chord_tension),
+            *_range(plan.unstrained_length),
+            *_range(1e3 * plan.state.cables.adjusting_length),
+            100.0 * float(np.mean(plan.feasible)),
+            1e6 * self.seconds / plan.status.size,
+        )
+        return dict(zip(ROWS, numbers, strict=True))
+
 
 def run_name(robot: sl.Robot, model: sl.CableModel) -> str:
     """Name of the files of a run, without suffix."""
     return file_stem(robot.name, type(model).__name__.lower())
-
-
-def run_along(
-    robot: sl.Robot,
-    path: sl.Path,
-    model: sl.CableModel,
-    tension: sl.TensionMethod,
-    line: ProgressLine,
-    wrench: Array | None = None,
-) -> ConfirmedRun:
-    """Plan a path, and confirm the plan with exact cables."""
-    sl.inverse(robot, path.pose[:1], model, tension, wrench)  # load the compiled kernels before the time is measured
-    start = perf_counter()
-    progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
-    plan = sl.inverse(robot, path, model, tension, wrench, progress=progress)
-    seconds = perf_counter() - start
-    return ConfirmedRun(sl.confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
-
-
-def summary(run: ConfirmedRun) -> dict[str, float]:
-    """The numbers of a run's feasible poses, by the keys of ROWS; NaN if no pose is feasible."""
-    plan = run.plan
-    error = 1e3 * np.linalg.norm(run.confirmation.position_error, axis=-1)
-    known = error[~np.isnan(error)]
-    numbers = (
-        *((float(known.max()), float(known.mean())) if known.size else (np.nan, np.nan)),
-        *_range(plan.chord_tension),
-        *_range(plan.unstrained_length),
-        *_range(1e3 * plan.state.cables.adjusting_length),
-        100.0 * float(np.mean(plan.feasible)),
-        1e6 * run.seconds / plan.status.size,
-    )
-    return dict(zip(ROWS, numbers, strict=True))
 
 
 def _gap_text(gap: sl.Gap, plan: sl.Plan) -> str:
@@ -193,20 +183,20 @@ def _gap_text(gap: sl.Gap, plan: sl.Plan) -> str:
     return f"{when}: {short}; limits of {cables}"
 
 
-def tell(runs: Sequence[ConfirmedRun], output: Output, notes: Sequence[str] = (), *, as_json: bool) -> int:
-    """Print the summary, notes and the infeasible parts of the paths; returns the exit code."""
+def tell(runs: Sequence[ConfirmedRun], output: Output, notes: Sequence[str] = ()) -> int:
+    """Print the summary, `notes`, and the infeasible parts of the paths. Returns the exit code."""
 
     def show() -> None:
         show_table(_summary_grid(runs))
         for note in notes:
             show_text(note)
 
-    output.report(lambda: {"runs": [_record(run) for run in runs]}, _verdict(runs), show, as_json=as_json)
+    output.report(lambda: {"runs": [_record(run) for run in runs]}, _verdict(runs), show)
     return max((_complaints(run) for run in runs), default=0)
 
 
 def _verdict(runs: Sequence[ConfirmedRun]) -> str:
-    """Sentence with the number of feasible, stable poses of all runs."""
+    """Sentence with the number of feasible and stable poses of all `runs`."""
     poses = sum(run.plan.status.size for run in runs)
     held = sum(int(np.sum(run.plan.feasible)) - run.lost for run in runs)
     of = "" if len(runs) == 1 else f" of {len(runs)} runs"
@@ -222,7 +212,7 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
         name = fill(run.plan.state.one_robot.name, WIDE, break_long_words=False, break_on_hyphens=False)
         how = fill(run.plan.method, NARROW, break_on_hyphens=False)
         heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}\n{how}")
-    numbers = [summary(run) for run in runs]
+    numbers = [run.summary() for run in runs]
     rows = [
         [label, *(n(column[field], form, size=1e3 * column[LONGEST]) for column in numbers)]
         for field, (label, form) in ROWS.items()
@@ -231,7 +221,7 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
 
 
 def _complaints(run: ConfirmedRun) -> int:
-    """Print the infeasible parts of the path; returns the exit code of this run."""
+    """Print the infeasible parts of the path of `run`. Returns the exit code."""
     name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
     for gap in gaps[:MOST_GAPS]:
         left = "is unstable" if gap.status is sl.PoseStatus.UNSTABLE else "leaves the feasible region"
@@ -241,7 +231,7 @@ def _complaints(run: ConfirmedRun) -> int:
     if gaps:
         limits = all(gap.status is sl.PoseStatus.INFEASIBLE for gap in gaps)
         show_note("", "The file contains the feasible part and marks the rest." + WIDEN * limits)
-    if run.lost > np.sum(plan.feasible & ~plan.solved):  # the infeasible parts do not include them
+    if run.lost > np.sum(plan.feasible & ~plan.solved):  # poses that are not in the infeasible parts
         what = f"{run.lost} of the planned poses are not stable equilibria: the platform would leave its path"
         show_note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
     return OUTSIDE if gaps or run.lost else 0
@@ -256,7 +246,7 @@ def _record(run: ConfirmedRun) -> dict[str, Any]:
         "tension": type(plan.tension).__name__,
         "tension_variable": plan.tension.variable,
         "poses": plan.status.size,
-        **summary(run),
+        **run.summary(),
         "poses_not_stable": run.lost,
         "gaps": [
             {

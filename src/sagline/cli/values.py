@@ -10,11 +10,9 @@ import numpy as np
 
 import sagline as sl
 from sagline.core.arrays import FARTHEST, checked
-from sagline.core.errors import InvalidValueError
 from sagline.files.pose_text import pose_of_text as pose_of_text
 from sagline.files.pose_text import wrench_of_text
 from sagline.files.quantity import in_si
-from sagline.robot.pose import PoseBox
 
 MOST_POSES = 1_000_000  # largest number of poses on a grid
 HEAVIEST = 1e12  # [kg], larger than on any machine, and far below the overflow of numbers
@@ -32,7 +30,7 @@ def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: fl
     """A number in SI units from "20" or "20 kg"; it is at least `low` and greater than `above`."""
     number = cast(float, in_si(text, unit, item))
     if abs(number) > HEAVIEST:
-        raise InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
+        raise sl.InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
     return float(checked(number, item, unit, shape=(), low=low, above=above))
 
 
@@ -42,22 +40,14 @@ def ratio(text: str, item: str) -> float:
     return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
 
 
-def formats_of(text: str, item: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    """Formats of figures from a text such as "png, pdf"."""
-    found = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",")))
-    if not set(found) <= set(known):
-        raise InvalidValueError(item, repr(text), ", ".join(known), f"Give one or several: {item} png,pdf.")
-    return found
-
-
 def wrenches_of(text: str, item: str) -> sl.WrenchSet:
     """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]".
 
-    A single force (moment, acceleration) holds for all axes; three numbers hold for x, y and z.
+    A single force, moment or acceleration holds for all axes. Three forces or moments hold for x, y and z.
     """
     if len(text) > _LONGEST or not _SIGN.match(text):
         if "±" in text or len(text) > _LONGEST:
-            raise InvalidValueError(item, repr(text), "all with ±, or all without", _STEP)
+            raise sl.InvalidValueError(item, repr(text), "all with ±, or all without", _STEP)
         return sl.WrenchPolytope([cast(Any, wrench_of_text(text, item, _STEP))])
     found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
     for part in text.split(","):
@@ -67,7 +57,7 @@ def wrenches_of(text: str, item: str) -> sl.WrenchSet:
         most = (0, 1, 3) if kind in ("force", "moment") else (0, 1)
         if len(sizes) not in most:
             allowed = f"{' or '.join(map(str, most[1:]))} of the unit {_KINDS[kind]}"
-            raise InvalidValueError(item, f"{text!r} with {len(sizes)}", allowed, _STEP)
+            raise sl.InvalidValueError(item, f"{text!r} with {len(sizes)}", allowed, _STEP)
     box = {kind: found[kind] if len(found[kind]) > 1 else sum(found[kind]) for kind in ("force", "moment")}
     whole: sl.WrenchSet = sl.WrenchBox(box["force"], box["moment"])
     if found["linear"] or found["angular"]:
@@ -82,12 +72,12 @@ def _load_of(part: str, item: str) -> tuple[str, float]:
         for kind, unit in _KINDS.items():
             try:
                 size = in_si(part[sign.end() :], unit, item)
-            except InvalidValueError:
+            except sl.InvalidValueError:
                 continue
             if isinstance(size, float) and 0.0 <= size < np.inf:
                 return kind, size
     units = ", ".join(_KINDS.values())
-    raise InvalidValueError(item, repr(part.strip()), f"± and a number with one of the units {units}", _STEP)
+    raise sl.InvalidValueError(item, repr(part.strip()), f"± and a number with one of the units {units}", _STEP)
 
 
 def points_of(text: str, item: str) -> tuple[int, ...]:
@@ -96,16 +86,16 @@ def points_of(text: str, item: str) -> tuple[int, ...]:
     points = tuple(map(int, found.groups())) if found else (0,)
     if not 0 < prod(points) <= MOST_POSES:
         step = f"Give the points along x, y and z: {item} 20x15x8."
-        raise InvalidValueError(item, repr(text), f"NXxNYxNZ, 1 to {MOST_POSES:,} poses", step)
+        raise sl.InvalidValueError(item, repr(text), f"NXxNYxNZ, 1 to {MOST_POSES:,} poses", step)
     return points
 
 
-def box_of(text: str, item: str) -> PoseBox:
-    """A box of level poses from "-2..2, -1..1, 1..3 m". One number instead of a span makes the box a plane."""
+def box_of(text: str, item: str) -> sl.PoseBox:
+    """A box of level poses from "-2..2, -1..1, 1..3 m". A number instead of a span, "0", makes the box a plane."""
     step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
     parts = text.replace("−", "-").split(",")
     if len(parts) != 3 or len(text) > _LONGEST:
-        raise InvalidValueError(item, repr(text), "three spans between commas", step)
+        raise sl.InvalidValueError(item, repr(text), "three spans between commas", step)
     unit = _UNIT.search(_ends_of(parts[2])[1])
     ends = []
     for part in parts:
@@ -115,8 +105,8 @@ def box_of(text: str, item: str) -> PoseBox:
         ends.append([quantity(end if _UNIT.search(end) else end + shared, item, "m") for end in own])
     low, high = np.array(ends).T
     if (low > high).any() or np.abs(ends).max() > FARTHEST:
-        raise InvalidValueError(item, repr(text), f"from low to high, up to {FARTHEST:g} m", step)
-    return PoseBox(low, high)
+        raise sl.InvalidValueError(item, repr(text), f"from low to high, up to {FARTHEST:g} m", step)
+    return sl.PoseBox(low, high)
 
 
 def _ends_of(part: str) -> tuple[str, str]:

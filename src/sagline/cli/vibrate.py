@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from sagline.core.numbers import counted
 from sagline.files.writing import file_stem
 
 if TYPE_CHECKING:
+    from sagline.cli.terminal import ProgressLine
     from sagline.dynamics.vibration.vibration import ListedMode
 
 
@@ -34,64 +35,53 @@ class _Direction(StrEnum):
     ABOUT_Z = "about z"
 
 
-LEAST_SHARE = 0.05  # modes with a smaller share of the platform are not printed; the file has all modes
+LEAST_SHARE = 0.05  # smallest share of the platform in a printed mode; the file has all modes
 COLUMNS = ("mode", "kind", "frequency_hz", "platform_share", "cable", "cable_share", "damping_ratio")
 HEADS = "mode", "with cable\nmass [Hz]", "platform\n[%]", "cable", "its share\n[%]", "damping\n[%]", "massless\n[Hz]"
 LOWEST = 3  # number of the lowest modes, which are always printed
 FIGURES = ("frequency", "peak")  # figures of a map
+WITHOUT_MAP = opt.only_without("--map")
 TABLE, MAP = "-modes.csv", "-vibration-map.nc"
 
 
-_PointsOption = Annotated[
-    Any,
-    opt.converted(
+@dataclass(frozen=True)
+class _Files(opt.Files):
+    table: bool = opt.if_only(opt.TABLE, WITHOUT_MAP)
+
+
+def vibrate(
+    name: str = opt.ROBOT,
+    pose: Any = opt.if_only(opt.POSE, WITHOUT_MAP),
+    points: Any = opt.converted(
+        None,
         "NXxNYxNZ",
         "Map the lowest frequency and the largest response over the test box, at NXxNYxNZ poses.",
         "points_of",
         "--map",
     ),
-]
-_DampingOption = Annotated[
-    float,
-    opt.converted(
-        "RATIO", "Damping ratio of every mode, 0.01 or '1 %', in addition to the damping of the cables.", "ratio"
+    up_to: float = opt.quantity(20, "HZ", "Find all modes below this frequency.", "Hz", above=0.0),
+    damping: float = opt.converted(
+        0.01, "RATIO", "Damping ratio of every mode, 0.01 or '1 %', in addition to the damping of the cables.", "ratio"
     ),
-]
-_AxisOption = Annotated[
-    _Direction,
-    opt.choice("AXIS", "Axis of the force or moment in the figure of the response", _Direction),
-    opt.only_with("--figures"),
-    opt.only_without("--map"),
-]
-
-
-def vibrate(
-    name: opt.RobotArgument,
-    pose: Annotated[opt.PoseOption, opt.only_without("--map")] = None,
-    points: _PointsOption = None,
-    up_to: Annotated[float, opt.quantity("HZ", "Find all modes below this frequency.", "Hz", above=0.0)] = 20,
-    damping: _DampingOption = 0.01,
-    loss_time: opt.LossTimeOption = None,
-    air_damping: opt.AirDampingOption = 0,
-    axis: _AxisOption = _Direction.X,
-    film: Annotated[
-        int | None,
-        opt.option("MODE", "Write an animation of this mode, ten seconds, as GIF."),
-        opt.only_without("--map"),
-    ] = None,
-    tension: opt.TensionOption = opt.Tension.CLOSEST,
-    wrench: Annotated[opt.WrenchOption, opt.only_without("--map")] = None,
-    payload: opt.PayloadOption = None,
-    folder: opt.OutOption = Path("output"),
-    figures: opt.FiguresOption = True,
-    formats: opt.FormatsOption = opt.USUAL_FORMATS,
-    style: opt.StyleOption = opt.FigureStyle.PLAIN,
-    write_table: Annotated[opt.TableOption, opt.only_without("--map")] = True,
-    as_json: opt.JsonOption = False,
+    loss_time: float | None = opt.LOSS_TIME,
+    air_damping: float = opt.AIR_DAMPING,
+    axis: _Direction = opt.choice(
+        _Direction.X,
+        "AXIS",
+        "Axis of the force or moment in the figure of the response",
+        _Direction,
+        opt.only_with("--figures"),
+        WITHOUT_MAP,
+    ),
+    film: int | None = opt.option(None, "MODE", "Write an animation of this mode, ten seconds, as GIF.", WITHOUT_MAP),
+    tension: str = opt.TENSION,
+    wrench: Any = opt.if_only(opt.WRENCH, WITHOUT_MAP),
+    payload: float | None = opt.PAYLOAD,
+    files: _Files = _Files(table=True),
 ) -> int:
-    """Find all natural frequencies at a pose: the platform's, and those of the cables, which vibrate as strings.
+    """Find all natural frequencies at a pose: those of the platform, and those of the cables, which vibrate as strings.
 
-    The table shows, for each mode, the platform's share and the cable with the largest share, and the frequencies with
+    For each mode, the table shows the share of the platform, the cable with the largest share, and the frequency with
     massless cables. DIR/ROBOT-modes.csv has all modes. The figure shows the response to a force, with and without
     cable mass. Exit code 1 if the pose is not feasible or is not a stable equilibrium.
 
@@ -103,40 +93,41 @@ def vibrate(
     """
     from sagline.dynamics.vibration.vibration import listed_modes
 
-    losses, method = sl.Damping(loss_time or 0.0, air_damping, damping), tension.build(opt.TensionVariable.CHORD)
+    losses, method = sl.Damping(loss_time or 0.0, air_damping, damping), opt.tension_named(tension)
     robot = opt.robot_with_payload(name, payload)
     if points is not None:
-        drawn = [f"-vibration-map-{figure}" for figure in FIGURES if figures]
-        output = Output(folder, file_stem(robot.name), [MAP], drawn, formats, style)
-        return _vibrate_in_box(robot, points, up_to, losses, method, output, as_json=as_json)
-    reel = f"-mode-{film}.gif"
-    parts = [*[TABLE] * write_table, *[reel] * (film is not None)]
-    output = Output(folder, file_stem(robot.name), parts, ["-response"] * figures, formats, style)
+        drawn = [f"-vibration-map-{figure}" for figure in FIGURES]
+        output = Output(files, file_stem(robot.name), [MAP], drawn)
+        return _vibrate_in_box(robot, points, up_to, losses, method, output)
+    # --out may give the name of the first file, which is the table
+    parts = [*[TABLE] * files.table, *[f"-mode-{film}.gif"] * (film is not None)]
+    output = Output(files, file_stem(robot.name), parts, ["-response"])
     place = opt.middle_pose(robot) if pose is None else pose
     with working(f"{robot.name}: modes up to {up_to:g} Hz") as line:
         plan = sl.inverse(robot, place, tension=method, wrench=wrench)
-        if not plan.feasible:
-            show_note("No modes: ", reason(robot, place, plan), style="bold red")
-            return OUTSIDE
-        found = sl.vibration(plan.state, up_to=up_to, damping=losses)
-        if found.status in (sl.VibrationStatus.UNSTABLE, sl.VibrationStatus.NO_LENGTHS):
-            show_note("No modes: ", found.status.text, style="bold red")
+        found = sl.vibration(plan.state, up_to=up_to, damping=losses) if plan.feasible else None
+        if found is None or found.status in (sl.VibrationStatus.UNSTABLE, sl.VibrationStatus.NO_LENGTHS):
+            why = reason(robot, place, plan) if found is None else found.status.text
+            show_note("No modes: ", why, style="bold red")
             return OUTSIDE
         modes = listed_modes(found)
         _check_film(film, modes)
-        if write_table:
-            output.table(TABLE, [[column.replace("_hz", " [Hz]") for column in COLUMNS], *map(_numbers, modes)])
-        if figures and found.status is sl.VibrationStatus.SOLVED and found.frequency.size:
-            line.stage("drawing the response")
-            output.draw(lambda: sl.plot.response(found, axis.value))
-        if film is not None:
-            sl.plot.film(found, film, output.file(reel), progress=line.stage(f"filming mode {film}"))
-    tell = partial(_tell, found, modes, plan.state)
-    output.report(partial(_record, found, modes), _verdict(found, modes), tell, as_json=as_json)
+        output.table(TABLE, lambda: [[column.replace("_hz", " [Hz]") for column in COLUMNS], *map(_numbers, modes)])
+        _draw(found, axis, film, output, line)
+    output.report(partial(_record, found, modes), _verdict(found, modes), partial(_tell, found, modes, plan.state))
     if found.status is sl.VibrationStatus.FOLDED:
         slack = ", ".join(map(str, found.slack_cables))
         show_note(f"Cables {slack}: ", found.status.text, style="bold")
     return 0
+
+
+def _draw(found: sl.Vibration, axis: _Direction, film: int | None, output: Output, line: ProgressLine) -> None:
+    """Draw the response of a stable equilibrium with modes, and the animation of the mode `film`."""
+    if found.status is sl.VibrationStatus.SOLVED and found.frequency.size:
+        line.stage("drawing the response")
+        output.draw(lambda: sl.plot.response(found, axis.value))
+    if film is not None:
+        sl.plot.film(found, film, output.file(f"-mode-{film}.gif"), progress=line.stage(f"filming mode {film}"))
 
 
 def _check_film(film: int | None, modes: list[ListedMode]) -> None:
@@ -158,7 +149,7 @@ def _verdict(found: sl.Vibration, modes: list[ListedMode]) -> str:
 
 
 def _tell(found: sl.Vibration, modes: list[ListedMode], state: sl.Equilibrium) -> None:
-    """Print the table; a massless mode is in the row of the mode that is most similar to it."""
+    """Print the table. The frequency of a massless mode is in the row of the most similar mode with cable mass."""
     from sagline.dynamics.vibration.vibration import MASSLESS, WITH_MASS, mode_correlation
 
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]
@@ -219,31 +210,25 @@ def _record(found: sl.Vibration, modes: list[ListedMode]) -> dict[str, Any]:
 
 
 def _vibrate_in_box(
-    robot: sl.Robot,
-    points: Sequence[int],
-    limit: float,
-    damping: sl.Damping,
-    method: sl.TensionMethod,
-    output: Output,
-    *,
-    as_json: bool,
+    robot: sl.Robot, points: Sequence[int], limit: float, damping: sl.Damping, method: sl.TensionMethod, output: Output
 ) -> int:
-    """Compute, write and draw the maps over the test box; returns the exit code."""
+    """Compute, write and draw the maps over the test box. Returns the exit code."""
+    from sagline.robot.pose import level_grid
+
     if robot.test_box is None:
         raise sl.InvalidValueError("--map", "of a robot without a test box", "one with a test_box", "Add it.")
-    poses = opt.level_grid(robot.test_box, points)
+    poses = level_grid(robot.test_box, points)
     what = f"{robot.name}: modes at {len(poses):,} poses"
     with working(what) as line:
         found = sl.frequency_map(robot, poses, up_to=limit, damping=damping, tension=method, progress=line.progress)
         found.save(output.file(MAP))
-        if output.draws:
-            line.stage("drawing")
-            output.draw(*(partial(sl.plot.frequency_map, found, figure) for figure in FIGURES))
+        line.stage("drawing")
+        output.draw(*(partial(sl.plot.frequency_map, found, figure) for figure in FIGURES))
     known = np.isfinite(found.frequency)
 
     tell = partial(_tell_map, found) if known.any() else lambda: None
     verdict = f"{int(known.sum()):,} of {known.size:,} poses have modes below {limit:g} Hz."
-    output.report(lambda: _record_of_map(found), verdict, tell, as_json=as_json)
+    output.report(lambda: _record_of_map(found), verdict, tell)
     if known.any():
         return 0
     show_note("No modes: ", "no feasible pose of the box has a mode below --up-to; raise it", style="bold red")

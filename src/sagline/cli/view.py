@@ -9,13 +9,14 @@ import sys
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from socket import gethostname
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from types import FrameType
+from typing import TYPE_CHECKING, Any, Final
 
 import sagline as sl
 from sagline.cli import options as opt
@@ -27,76 +28,54 @@ if TYPE_CHECKING:
     from sagline.viewer.session import LogFollower, PlayedLog
 
 LOG: Final = ".mcap"
-NO_PAGE: Final = "Draw its motion with sagline track, or record a simulation."  # with fewer cables than freedoms
 LATER = "trimesh"  # a package that the viewer imports only when it is needed
 LOOK: Final = 0.5  # time between two checks of a growing file [s]
 
 
-class ServerAddress(NamedTuple):
-    """Address and port of the page (0: any free port); `browser`: open a browser here; `access`: see `start_server`."""
+@dataclass(frozen=True)
+class ServerOptions:
+    """Options of the server of the page."""
 
-    host: str
-    port: int
-    browser: bool
-    access: Mapping[str, Any] = MappingProxyType({})
-
-
-_RobotOption = Annotated[
-    str,
-    opt.argument(
-        "ROBOT",
-        "A preset (see sagline robots), a robot file, robot.yaml, a log of the controller, run.mcap, or a "
-        "calibration, found.nc.",
-        opt.robot_completions,
-    ),
-]
-_RunOption = Annotated[
-    Path | None,
-    opt.argument(
-        "RUN",
-        "A run of this robot by sagline track, a simulation or a log of the controller, which is played; or a "
-        "calibration, which is shown.",
-    ),
-]
-_BesideOption = Annotated[
-    Path | None, opt.option("RUN", "Another run of the same robot, shown as a ghost at the same time.")
-]
-_TruthOption = Annotated[
-    Path | None,
-    opt.option(
-        "TWIN.mcap", "For a log of the controller: the log of the twin, which has the true pose of the platform."
-    ),
-]
-_AllowHostOption = Annotated[
-    list[str] | None,
-    opt.option("NAME", "Further name of this machine, or of a proxy, in the address of a browser. It can be repeated."),
-]
+    host: str = opt.HOST
+    port: int = opt.port(8080)
+    token: bool = opt.flag(True, "Accept only requests with the token in the printed address.", "--token/--no-token")
+    clients: int = opt.converted(
+        32, "NUMBER", "Largest number of pages open at the same time.", opt.whole_of, least=1, most=1000
+    )
+    allow_host: list[str] | None = opt.option(
+        None,
+        "NAME",
+        "Name of this machine or of a proxy that browsers may use in the address. The option can be repeated.",
+    )
+    browser: bool = opt.flag(True, "Open the page in a browser on this machine.", "--browser/--no-browser")
 
 
 def view(
-    robot: _RobotOption,
-    run: _RunOption = None,
-    beside: _BesideOption = None,
-    live: Annotated[bool, opt.flag("Follow a log that is still being written.", "--live")] = False,
-    truth: _TruthOption = None,
-    pose: opt.PoseOption = None,
-    mode: Annotated[
-        str | None,
-        opt.option("NUMBER", "Natural mode to animate at the start: 1, 2, ..., or 'massless 1' for massless cables."),
-    ] = None,
-    wrench: opt.WrenchOption = None,
-    payload: opt.PayloadOption = None,
-    host: opt.HostOption = "127.0.0.1",
-    port: opt.PortOption = 8080,
-    token: Annotated[
-        bool, opt.flag("Accept only requests with the token in the printed address.", "--token/--no-token")
-    ] = True,
-    clients: Annotated[
-        int,
-        opt.converted("NUMBER", "Largest number of pages open at the same time.", opt.whole_of, least=1, most=1000),
-    ] = 32,
-    allow_host: _AllowHostOption = None,
-    browser: Annotated[bool, opt.flag("Open the page in a browser on this machine.", "--browser/--no-browser")] = True,
+    robot: str = opt.argument(
+        opt.NEEDED,
+        "ROBOT",
+        "A preset (see sagline robots), a robot file (robot.yaml), a log of the controller (run.mcap) or a "
+        "calibration (found.nc).",
+        completion=opt.robot_completions,
+    ),
+    run: Path | None = opt.argument(
+        None,
+        "RUN",
+        "A run of sagline track, a simulation or a log of this robot, which the page plays; or a calibration of this "
+        "robot, which the page shows.",
+    ),
+    beside: Path | None = opt.option(None, "RUN", "Another run of the same robot, shown as a ghost at the same time."),
+    live: bool = opt.flag(False, "Follow a log that is still being written.", "--live"),
+    truth: Path | None = opt.option(
+        None, "TWIN.mcap", "For a log of the controller: the log of the twin, which has the true pose of the platform."
+    ),
+    pose: Any = opt.POSE,
+    mode: str | None = opt.option(
+        None, "NUMBER", "Natural mode to animate at the start: 1, 2, ..., or 'massless 1' for massless cables."
+    ),
+    wrench: Any = opt.WRENCH,
+    payload: float | None = opt.PAYLOAD,
+    address: ServerOptions = ServerOptions(),
 ) -> int:
     """Show a robot in the browser; its platform can be dragged, and the cables follow.
 
@@ -115,14 +94,12 @@ def view(
         sagline view run.mcap --live
         sagline view run.mcap --truth twin.mcap
     """
-    access = {"token": token, "clients": clients, "allow_host": allow_host or ()}
-    address = ServerAddress(host, port, browser, access)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
     if log is None and (live or truth is not None):
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
         raise sl.InvalidValueError(item, "given without a log", "a log in MCAP", step)
     found = run if run is not None and _is_calibration(run) else None
-    if found is None and Path(robot).suffix.lower() == ".nc":  # not a robot file; the reader reports the error
+    if found is None and Path(robot).suffix.lower() == ".nc":  # not a robot file; the reader raises the error
         found = Path(robot)
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
     given = [item for item, value in alone.items() if value is not None]
@@ -134,44 +111,42 @@ def view(
         step = "Give both: sagline view cogiro run_a.nc --beside run_b.nc"
         raise sl.InvalidValueError("--beside", "given without a run", "two runs of one robot", step)
     if log is not None:
-        return view_log(log, robot if log is run else None, address, live=live, truth=truth, beside=beside)
+        return _view_log(log, robot if log is run else None, address, live=live, truth=truth, beside=beside)
     if found is not None:
-        return view_calibration(found, robot if found is run else None, address)
+        return _view_calibration(found, robot if found is run else None, address)
     start = {"pose": pose, "mode": _mode(mode), "wrench": wrench}
     machine = opt.robot_with_payload(robot, payload)
     if run is not None:
-        return view_run(machine, run, address, beside)
+        return _view_run(machine, run, address, beside)
     return view_robot(machine, robot, address, None if payload is None else machine.mass, **start)
 
 
 def view_robot(
-    robot: sl.Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any
+    robot: sl.Robot, name: str | Path, address: ServerOptions, mass: float | None = None, **start: Any
 ) -> int:
-    """Serve a robot with a payload [kg] until Ctrl-C; returns the exit code."""
-    from sagline.robot.reach import check_cable_count
+    """Serve the page of a robot until Ctrl-C. `mass`: platform with payload [kg]. Returns the exit code."""
+    from sagline.kinematics.inverse_rows import given_codes
 
-    check_cable_count(robot, step=NO_PAGE)
+    given_codes(robot, None)  # raises an error if the pose cannot be computed from a position
     Source = _viewer()
     if start.get("mode"):
         _check_mode(robot, **start)
     return serve(robot, address, source=Source.of_robot(name, mass), **start)
 
 
-def view_run(robot: sl.Robot, file: Path, address: ServerAddress, beside: Path | None = None) -> int:
-    """Serve a run or a simulation of a robot, optionally with another run, until Ctrl-C; returns the exit code."""
+def _view_run(robot: sl.Robot, file: Path, address: ServerOptions, beside: Path | None = None) -> int:
+    """Serve the page of a run or simulation until Ctrl-C, with a second run `beside`. Returns the exit code."""
     Source = _viewer()
-    from sagline.robot.reach import check_cable_count
     from sagline.viewer.playback import PlayedSimulation
 
-    check_cable_count(robot, step=NO_PAGE)
-    played = played_in(robot, file)
-    other = None if beside is None else played_beside(played.robot, file, beside)
+    played = _played_in(robot, file)
+    other = None if beside is None else _played_beside(played.robot, file, beside)
     source = Source.of_file("simulation" if isinstance(played, PlayedSimulation) else "plan", file)
     return serve(played.robot, address, played=played, source=source, beside=other)
 
 
-def view_calibration(file: Path, robot: str | None, address: ServerAddress) -> int:
-    """Serve a calibrated robot with its calibration until Ctrl-C; returns the exit code."""
+def _view_calibration(file: Path, robot: str | None, address: ServerOptions) -> int:
+    """Serve the page of a calibration and its robot until Ctrl-C. Returns the exit code."""
     Source = _viewer()
     found = sl.load_calibration(file)
     if robot is not None:
@@ -179,16 +154,16 @@ def view_calibration(file: Path, robot: str | None, address: ServerAddress) -> i
     return serve(found.robot, address, found=found, source=Source.of_file("calibration", file))
 
 
-def view_log(
+def _view_log(
     file: Path,
     robot: str | None,
-    address: ServerAddress,
+    address: ServerOptions,
     *,
     live: bool = False,
     truth: Path | None = None,
     beside: Path | None = None,
 ) -> int:
-    """Serve a log of the controller until Ctrl-C; `live`: follow a growing log. Returns the exit code."""
+    """Serve the page of a log until Ctrl-C. If `live`, the page follows a growing log. Returns the exit code."""
     Source = _viewer()
     from sagline.viewer.session import LogFollower
 
@@ -197,7 +172,7 @@ def view_log(
         session = _first_session(follower, [log for log in (file, truth) if log is not None], live=live)
     if robot is not None:
         _check_robot(file, "log", session.robot, sl.load_robot(robot), alone=True)
-    other = None if beside is None else played_beside(session.robot, file, beside)
+    other = None if beside is None else _played_beside(session.robot, file, beside)
     if not live and not follower.log.complete:
         show_note("Note: ", f"{file} was cut off: its last second is missing.", style="bold")
     return serve(
@@ -210,8 +185,8 @@ def view_log(
     )
 
 
-def played_in(robot: sl.Robot, file: Path) -> Played:
-    """The run, simulation or log of a robot in a file; FileError if the file belongs to another robot."""
+def _played_in(robot: sl.Robot, file: Path) -> Played:
+    """The run, simulation or log in `file`. FileError if `file` does not belong to `robot`."""
     from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT
     from sagline.viewer.playback import PlayedPlan, PlayedSimulation
@@ -233,23 +208,23 @@ def played_in(robot: sl.Robot, file: Path) -> Played:
         return PlayedPlan(plan, line.progress)
 
 
-def played_beside(robot: sl.Robot, first: Path, second: Path) -> Beside:
-    """The second run of a robot, which is played together with the first. Both runs have the names of their files."""
+def _played_beside(robot: sl.Robot, first: Path, second: Path) -> Beside:
+    """The run in the file `second`, which is played together with the run in `first`; with the names of both runs."""
     from sagline.viewer.player import Beside
 
     names = (first.name, second.name) if first.name != second.name else (str(first), str(second))
-    return Beside(played_in(robot, second), names)
+    return Beside(_played_in(robot, second), names)
 
 
 def _check_robot(file: Path, kind: str, made_for: sl.Robot, robot: sl.Robot, *, alone: bool = False) -> None:
-    """Raise FileError if `file` belongs to another robot. Its next step is the command that views `file`."""
+    """Raise FileError if `made_for` is not `robot`. The message has the command that views `file`."""
     if made_for.name != robot.name:
         step = f"View it as: sagline view {file if alone else f'{made_for.name} {file}'}"
         raise sl.FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
 
 
 def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> PlayedLog:
-    """Cycles in a log. With `live`, the function waits until all `logs` exist and contain a cycle."""
+    """The cycles in the log of `follower`. If `live`, the function waits until all `logs` exist and contain a cycle."""
     from sagline.files.mcap_reader import has_begun
 
     while live and not all(map(has_begun, logs)):
@@ -264,7 +239,7 @@ def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Pl
 
 @contextmanager
 def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
-    """Show new cycles of the log on the page inside the `with` block."""
+    """Inside the `with` block, show new cycles of the log of `follower` on the page `viewer`."""
     over = threading.Event()
 
     def look() -> None:
@@ -286,7 +261,7 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
 
 
 def _viewer() -> type[Source]:
-    """The class that names what a page shows; FileError if a package that the viewer needs is not installed."""
+    """The class `Source`. FileError if a package that the viewer needs is not installed."""
     try:
         import sagline.viewer.features  # noqa: F401
         from sagline.viewer.page import Source
@@ -305,7 +280,7 @@ def _is_calibration(file: Path) -> bool:
 
 
 def _mode(text: str | None) -> str:
-    """Name of a mode: "1", "massless 1"; "" for none."""
+    """Name of the mode in `text`: "1", "massless 1", or "" for none."""
     words = " ".join((text or "").split())
     if words and not re.fullmatch(r"(massless )?[1-9][0-9]{0,3}", words):
         step = "The page lists the modes."
@@ -314,7 +289,7 @@ def _mode(text: str | None) -> str:
 
 
 def _check_mode(robot: sl.Robot, pose: sl.Pose | None, mode: str, wrench: Any) -> None:
-    """Reject `mode` if it is not in the list of modes at `pose`. If there is no list, the page states the reason."""
+    """Reject `mode` if the modes at `pose` do not include it. If there are no modes, the page states the reason."""
     from sagline.robot.reach import home_pose
     from sagline.viewer.features.modes import UP_TO, range_of_modes
     from sagline.viewer.swing import mode_of
@@ -329,19 +304,35 @@ def _check_mode(robot: sl.Robot, pose: sl.Pose | None, mode: str, wrench: Any) -
 
 def serve(
     robot: sl.Robot,
-    address: ServerAddress,
+    address: ServerOptions,
     *,
     meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
     **page: Any,
 ) -> int:
-    """Serve a page until Ctrl-C, inside the context `meanwhile`; returns the exit code. `page`: arguments of `Page`."""
+    """Serve a page until Ctrl-C, inside the context `meanwhile`. `page`: arguments of `Page`. Returns the exit code."""
+    from sagline.robot.batch import refuse_slanted
     from sagline.viewer import server as web
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
 
-    server = web.start_server(address.host, address.port, robot.name, **address.access)
+    refuse_slanted(robot)
+    server = web.start_server(
+        address.host,
+        address.port,
+        robot.name,
+        token=address.token,
+        clients=address.clients,
+        allow_host=address.allow_host or (),
+    )
+    stopping = threading.Event()
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if not stopping.is_set():
+            stopping.set()  # an imported package can catch the exception and continue; trimesh does
+        signal.default_int_handler(number, frame)
+
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C is the normal end of the command from here
+        signal.signal(signal.SIGINT, stop)  # Ctrl-C is the normal end of the command from here
     try:
         show_text(f"{robot.name} is at {server.url}   (Ctrl-C stops it)", whole=True)
         if not server.access.local:
@@ -349,15 +340,17 @@ def serve(
             place = server.url_at(server.access.path, gethostname())
             text = f"on other machines it is {place}. Everyone {who} can see the page and drag the platform."
             show_note("Note: ", text, style="bold")
-        viewer = Page(server, FEATURES, robot, **page)
+        viewer = Page(server, FEATURES, robot, stopping=stopping, **page)
         if address.browser and _has_display():
             webbrowser.open(server.url_at(server.access.path_once()))
         with meanwhile(viewer):
             viewer.serve()
     except KeyboardInterrupt:
-        show_note("", "Stopped.")
+        stopping.set()
     finally:
         web.stop_server(server)
+    if stopping.is_set():
+        show_note("", "Stopped.")
     return 0
 
 

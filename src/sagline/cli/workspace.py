@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import sagline as sl
 from sagline.cli import options as opt
@@ -17,37 +18,63 @@ from sagline.core.numbers import counted
 from sagline.files.writing import file_stem
 
 if TYPE_CHECKING:
+    from sagline.cli.terminal import ProgressLine
     from sagline.interference.pairs import Obstacle
     from sagline.workspaces.workspace import Limit
 
 LIMIT = ("criterion", "cable", "share")
 MOST_LIMITS = 12  # largest number of limits that are printed
-LoadsOption = Annotated[
-    Any,
-    opt.converted(
-        "LOADS",
-        "Loads in addition to the weight, at all poses: '±100 N, ±20 N m', accelerations '±2 m/s^2, ±1 rad/s^2', both, "
-        "or one wrench FX,FY,FZ[,MX,MY,MZ].",
-        "wrenches_of",
-    ),
-]
 
 
-def _criteria(robot: str, limits: Sequence[float | None], scene: str | None, *, in_frame: bool) -> list[sl.Criterion]:
-    """The criteria that the options state, in the order of their limits; without --scene, the robot's scene is used."""
+class _HullName(StrEnum):
+    """Hulls of a workspace: from the exact margin, from its lower bound (inner) or from its upper bound (outer)."""
 
-    def with_clearance(limit: float) -> sl.Criterion:
-        return sl.Clearance(limit, _obstacles(robot, scene))
+    EXACT = "exact"
+    INNER = "inner"
+    OUTER = "outer"
 
-    kinds: tuple[Callable[[float], sl.Criterion], ...] = (
-        sl.LeastMargin, sl.MaximumSag, sl.LeastStiffness, sl.LeastFrequency, with_clearance
-    )  # fmt: skip
-    found = [kind(limit) for kind, limit in zip(kinds, limits, strict=True) if limit is not None]
-    return found + [sl.InFrame()] * in_frame
+
+@dataclass(frozen=True)
+class _Limits:
+    """Options that state criteria."""
+
+    reserve: float | None = opt.quantity(None, "FORCE", "Least allowed capacity margin [N].", "N", low=0.0)
+    max_sag: float | None = opt.quantity(None, "LENGTH", "Largest allowed sag of a cable, '5 cm'.", "m", above=0.0)
+    min_stiffness: float | None = opt.quantity(
+        None, "NUMBER", "Least allowed translational stiffness [N/m].", "N/m", above=0.0
+    )
+    min_frequency: float | None = opt.quantity(
+        None, "HZ", "Least allowed natural frequency, with massless cables.", "Hz", above=0.0
+    )
+    clearance: float | None = opt.quantity(
+        None, "LENGTH", "Least allowed distance between cables, platform and obstacles, '3 cm'.", "m", above=0.0
+    )
+    scene: str | None = opt.option(
+        None,
+        "FILE",
+        "Obstacles for --clearance: a robot file or a mesh in meters. Default: the robot's scene.",
+        opt.only_with("--clearance"),
+    )
+    in_frame: bool = opt.flag(False, "Require that the whole platform is within the frame.", "--in-frame")
+
+    def criteria(self, robot: str) -> Iterator[sl.Criterion]:
+        """The criteria that the options state. Without --scene, the obstacles are those of the robot file `robot`."""
+        if self.reserve is not None:
+            yield sl.LeastMargin(self.reserve)
+        if self.max_sag is not None:
+            yield sl.MaximumSag(self.max_sag)
+        if self.min_stiffness is not None:
+            yield sl.LeastStiffness(self.min_stiffness)
+        if self.min_frequency is not None:
+            yield sl.LeastFrequency(self.min_frequency)
+        if self.clearance is not None:
+            yield sl.Clearance(self.clearance, _obstacles(robot, self.scene))
+        if self.in_frame:
+            yield sl.InFrame()
 
 
 def _obstacles(robot: str, scene: str | None) -> tuple[Obstacle, ...]:
-    """The obstacles of --scene (a robot file or a mesh file), at least one; without --scene, those of the robot."""
+    """The obstacles in the robot file or mesh file `scene`, at least one. If it is None, those of the file `robot`."""
     if scene is None:
         return () if robot in sl.robot_names() else sl.load_scene(robot)
     path = Path(scene)
@@ -58,91 +85,44 @@ def _obstacles(robot: str, scene: str | None) -> tuple[Obstacle, ...]:
     raise sl.FileError(path, "has no scene", "Name a robot file with a scene, or a mesh file.")
 
 
-_TiltOption = Annotated[
-    float,
-    opt.quantity(
+def workspace(
+    name: str = opt.ROBOT,
+    loads: Any = opt.converted(
+        None,
+        "LOADS",
+        "Loads in addition to the weight, at all poses: '±100 N, ±20 N m', accelerations '±2 m/s^2, ±1 rad/s^2', both, "
+        "or one wrench FX,FY,FZ[,MX,MY,MZ].",
+        "wrenches_of",
+    ),
+    payload: float | None = opt.PAYLOAD,
+    tilt: float = opt.quantity(
+        0,
         "ANGLE",
         "Angle by which the platform must be able to tilt about any axis, '10deg'. Default: the platform is level.",
         "rad",
         low=0.0,
     ),
-]
-_BoxOption = Annotated[
-    Any,
-    opt.converted("BOX", "Box of positions: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.", "box_of"),
-]
-_ReserveOption = Annotated[float | None, opt.quantity("FORCE", "Least allowed capacity margin [N].", "N", low=0.0)]
-_MaxSagOption = Annotated[
-    float | None, opt.quantity("LENGTH", "Largest allowed sag of a cable, '5 cm'.", "m", above=0.0)
-]
-_MinStiffnessOption = Annotated[
-    float | None, opt.quantity("NUMBER", "Least allowed translational stiffness [N/m].", "N/m", above=0.0)
-]
-_MinFrequencyOption = Annotated[
-    float | None, opt.quantity("HZ", "Least allowed natural frequency, with massless cables.", "Hz", above=0.0)
-]
-_ClearanceOption = Annotated[
-    float | None,
-    opt.quantity("LENGTH", "Least allowed distance between cables, platform and obstacles, '3 cm'.", "m", above=0.0),
-]
-_SceneOption = Annotated[
-    str | None,
-    opt.option("FILE", "Obstacles for --clearance: a robot file or a mesh in meters. Default: the robot's scene."),
-    opt.only_with("--clearance"),
-]
-
-
-class HullName(StrEnum):
-    """Hulls of a workspace: from the exact margin, or from its lower (inner) or upper bound (outer)."""
-
-    EXACT = "exact"
-    INNER = "inner"
-    OUTER = "outer"
-
-
-_ToProveOption = Annotated[
-    Any, opt.converted("BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove")
-]
-_BudgetOption = Annotated[
-    float,
-    opt.quantity("TIME", "Largest time for the proof of --prove [s].", "s", above=0.0),
-    opt.only_with("--prove"),
-]
-
-
-def workspace(
-    name: opt.RobotArgument,
-    loads: LoadsOption = None,
-    payload: opt.PayloadOption = None,
-    tilt: _TiltOption = 0,
-    box: _BoxOption = None,
-    reserve: _ReserveOption = None,
-    max_sag: _MaxSagOption = None,
-    min_stiffness: _MinStiffnessOption = None,
-    min_frequency: _MinFrequencyOption = None,
-    clearance: _ClearanceOption = None,
-    scene: _SceneOption = None,
-    in_frame: Annotated[bool, opt.flag("Require that the whole platform is within the frame.", "--in-frame")] = False,
-    to_prove: _ToProveOption = None,
-    budget: _BudgetOption = 10,
-    cells: Annotated[int, opt.option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
-    hull: Annotated[
-        HullName,
-        opt.option("HULL", "Hull from the exact margin, or from its lower (inner) or upper bound (outer).", "--hull"),
-    ] = HullName.EXACT,
-    model: opt.ModelOption = opt.ModelName.CATENARY,
-    folder: opt.OutOption = Path("output"),
-    figures: opt.FiguresOption = True,
-    formats: opt.FormatsOption = opt.USUAL_FORMATS,
-    style: opt.StyleOption = opt.FigureStyle.PLAIN,
-    table: opt.TableOption = False,
-    as_json: opt.JsonOption = False,
+    box: Any = opt.converted(None, "BOX", "Box of positions: '-2..2, -1..1, 1..3 m'. Default: the frame.", "box_of"),
+    limits: _Limits = _Limits(),
+    to_prove: Any = opt.converted(None, "BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove"),
+    budget: float = opt.quantity(
+        10, "TIME", "Largest time for the proof of --prove [s].", "s", opt.only_with("--prove"), above=0.0
+    ),
+    cells: int = opt.option(32, "NUMBER", "Cells of the grid along the longest edge of the box."),
+    hull: _HullName = opt.option(
+        _HullName.EXACT,
+        "HULL",
+        "Hull from the exact margin, from its lower bound (inner) or from its upper bound (outer).",
+        "--hull",
+    ),
+    model: str = opt.MODEL,
+    files: opt.Files = opt.Files(),
 ) -> int:
     """Find the workspace of a robot: its volume with an error bar, and the criteria that limit it.
 
     A pose belongs to the workspace if the sagging cables can balance all loads with tensions within their limits. DIR
-    has the workspace in NetCDF, its hull in GLB, and figures. Exit code 1 if the workspace is empty (then the pose
-    closest to feasible is printed), or if the box of --prove is not proved completely.
+    has the workspace in NetCDF, its hull in GLB, and figures. If the workspace is empty, the pose closest to
+    feasible is printed. Exit code 1 if the workspace is empty, or if the box of --prove is not proved completely.
 
     For example:
 
@@ -151,49 +131,48 @@ def workspace(
         sagline workspace article-suspended --prove "-2..2, -1..1, 1..3 m"
         sagline workspace ipanema-1 --max-sag "5 cm" --box "-1..1, -1..1, 0..2 m"
     """
-    limits = (reserve, max_sag, min_stiffness, min_frequency, clearance)
-    cable = model.build()
+    from sagline.workspaces.proof import check_provable
+
+    cable = opt.model_named(model)
     if tilt > pi:  # a number without unit is in radians, but the user may have meant degrees
         step = "Give the angle with its unit, --tilt 10deg; it cannot be more than half a turn."
         raise sl.InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = opt.robot_with_payload(name, payload)
-    criteria = _criteria(name, limits, scene, in_frame=in_frame)
-    space_file, mesh, limits_file = "-workspace.nc", "-hull.glb", "-limits.csv"
-    parts, drawn = [space_file, mesh, *[limits_file] * table], ["-workspace", "-slice"] if figures else []
-    output = Output(folder, file_stem(robot.name), parts, drawn, formats, style)
+    criteria = list(limits.criteria(name))
+    parts, drawn = ["-workspace.nc", "-hull.glb"], ["-workspace", "-slice"]
+    output = Output(files, file_stem(robot.name), parts, drawn, "-limits.csv")
+    if to_prove is not None:
+        check_provable(robot)
     with working(f"{robot.name}: workspace") as line:
         how: dict[str, Any] = {"model": cable, "cells": cells, "hull": hull.value, "progress": line.progress}
         space = sl.workspace(robot, box, loads, orientations=sl.Tilts(tilt), criteria=criteria, **how)
         proof = None
         if to_prove is not None:
-            claim = sl.PoseBox(to_prove.low, to_prove.high, tilt)
-            stage = line.stage(f"{robot.name}: proof")
-            proof = sl.prove(robot, claim, loads, budget=budget, model=cable, progress=stage)
-        space.save(output.file(space_file))
-        if space.nearest is None:
-            space.surface.export(output.file(mesh))
-            if figures:
-                line.stage("drawing")
-                _draw(space, output)
-        if table:
-            output.table(limits_file, [LIMIT, *_rows(space)])
+            stage, inside = line.stage(f"{robot.name}: proof"), sl.PoseBox(to_prove.low, to_prove.high, tilt)
+            proof = sl.prove(robot, inside, loads, budget=budget, model=cable, progress=stage)
+        _write(space, output, line)
     verdict = str(space).partition("\n")[0]
-    output.report(lambda: _record(space, proof), verdict, lambda: _tell(space, proof), as_json=as_json)
+    output.report(lambda: _record(space, proof), verdict, lambda: _tell(space, proof))
     if space.nearest is not None:
         show_note("Empty workspace: ", space.nearest.reason, style="bold red")
     proved = proof is None or proof.verdict is sl.ProofVerdict.PROVED_INSIDE
     return 0 if space.nearest is None and proved else OUTSIDE
 
 
-def _draw(space: sl.Workspace, output: Output) -> None:
-    """Draw the workspace, and a slice of it unless it is plane."""
-    output.draw(lambda: sl.plot.workspace(space))
-    if space.unit == "m³":  # for a plane, the first figure is the slice through the workspace
-        output.draw(lambda: sl.plot.slice(space))
+def _write(space: sl.Workspace, output: Output, line: ProgressLine) -> None:
+    """Write the workspace, its hull, its figures and the table of its limits."""
+    space.save(output.file("-workspace.nc"))
+    if space.nearest is None:
+        space.surface.export(output.file("-hull.glb"))
+        line.stage("drawing")
+        output.draw(lambda: sl.plot.workspace(space))
+        if space.unit == "m³":  # for a plane, the first figure is the slice through the workspace
+            output.draw(lambda: sl.plot.slice(space))
+    output.table("-limits.csv", lambda: [LIMIT, *_rows(space)])
 
 
 def _rows(space: sl.Workspace) -> list[tuple[object, ...]]:
-    """Criterion, cable (None if there is none) and share of each limit of the workspace."""
+    """Criterion, cable and share of each limit of the workspace. The cable is None for limits of the platform."""
     return [(limit.criterion, None if limit.cable < 0 else limit.cable, limit.share) for limit in space.limits]
 
 
@@ -231,6 +210,8 @@ def _ends(box: sl.PoseBox) -> dict[str, Any]:
 
 
 def _record(space: sl.Workspace, proof: sl.Proof | None) -> dict[str, Any]:
+    from sagline.workspaces.workspace import orientations_text
+
     unit = "m3" if space.unit == "m³" else "m2"
     near = space.nearest
     return {
@@ -240,7 +221,7 @@ def _record(space: sl.Workspace, proof: sl.Proof | None) -> dict[str, Any]:
         "components_separate": space.components.separate,
         **_ends(space.box),
         "open_faces": space.open_faces,
-        "orientations": str(space.orientations),
+        "orientations": orientations_text(space),
         "model": type(space.model).__name__,
         "hull": space.hull,
         "criteria": [str(one) for one in space.criteria],

@@ -1,4 +1,4 @@
-"""States of the controller as classes. Each prepares the next command and returns the next state."""
+"""States of the controller as classes. A state prepares the next command and returns the next state."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from sagline.control.commands import FRESH, Claim
 from sagline.control.context import Context
 from sagline.control.execution import ExecutionStatus
-from sagline.control.homing import Homing, HomingJog, jog_tension_limits
+from sagline.control.homing import Homing
 from sagline.control.link import CHECK, Missing, Mode, Sample
 from sagline.control.recording import EventKind
-from sagline.control.set_points import Along, PlatformJog, Ramp, SetPoint, SetPointSource, Standing
+from sagline.control.set_points import Along, HomingJog, PlatformJog, Ramp, SetPoint, SetPointSource, Standing
 from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from sagline.kinematics.status import ForwardStatus
 
-LEAVING: Final = 0.3  # longest time for giving up the ownership of all groups [s]
+LEAVING: Final = 0.3  # longest time in which the controller must have given up all groups [s]
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
 POSE_LOST: Final = "the pose of the platform is not known; home again"
 
@@ -28,7 +28,7 @@ class ActiveState(ABC):
 
     def __init__(self, context: Context, point: SetPoint | None = None, source: SetPointSource | None = None) -> None:
         """Enter the state with the set point of the previous state."""
-        # point: last set point that was sent; None if the drives rest
+        # point: last set point that was sent; None if the drives are at rest
         # source: source of the set points; None in a state without set points
         self.context, self.point, self.source = context, point, source
 
@@ -56,7 +56,7 @@ class ActiveState(ABC):
         row, sample = point.row, c.sample
         if c.tension_loop is not None and row is not None and sample is not None and c.state in LOOP_ON:
             planned = point.tension if due is None else due.tension
-            leads = point.leading or (due is not None and due.leading)  # the tensions differ from the plan on purpose
+            leads = point.leading or (due is not None and due.leading)  # here, tensions differ from the plan on purpose
             c.correction = c.tension_loop.step(sample.tension, planned, row, frozen=c.degraded or leads)
         length = point.length + c.correction
         length -= c.zero
@@ -64,16 +64,16 @@ class ActiveState(ABC):
         c.sender.follow(length, point.rate, point.drum_tension, point.enable)
 
     def settle(self, length: Array, status: ExecutionStatus, reason: str) -> ActiveState | None:
-        """Enter IDLE at the equilibrium for the lengths `length` [m]. Return None if no pose is found."""
+        """Enter IDLE at the equilibrium for the lengths `length` [m]. Returns None if no equilibrium is found."""
         self.context.end_run(status, reason)
-        return idle_at(self.context, self.context.find_equilibrium(length), reason)
+        return Following.at_rest(self.context, self.context.find_equilibrium(length), reason)
 
 
 class Off(ActiveState):
     """OFF: the controller gives up the ownership of all groups, and then sends no commands."""
 
     def __init__(self, context: Context, reason: str = "", point: SetPoint | None = None) -> None:
-        """Begin to give up all groups. If `reason` is empty, the controller owns no group yet."""
+        """Begin to give up all groups. An empty `reason` means that the controller owns no group yet."""
         super().__init__(context, point)
         self._cycles = 0
         if reason:
@@ -89,7 +89,7 @@ class Off(ActiveState):
         return self
 
     def leave(self, sample: Sample | None) -> None:
-        """Send the command LEAVE as long as the controller owns a group."""
+        """Send the command LEAVE while the controller owns a group."""
         self._cycles = max(self._cycles - 1, 0)
         if self._cycles and (sample is None or bool((sample.owner == self.context.owner).any())):
             self.rest(Mode.LEAVE, enabled=False)
@@ -102,7 +102,7 @@ class Connecting(ActiveState):
     """CONNECTING: the controller claims the groups."""
 
     def __init__(self, context: Context) -> None:
-        """Begin to claim."""
+        """Begin to claim all groups."""
         context.enter(State.CONNECTING, "claims the groups")
         super().__init__(context)
         self.claim = Claim(context.owner, context.link.groups, context.period, context.random)
@@ -129,7 +129,7 @@ class Connecting(ActiveState):
 
 
 class Holding(ActiveState):
-    """READY or FAULT: the drives hold their position."""
+    """READY or FAULT: the drives hold their present position."""
 
     def __init__(self, context: Context, state: State, reason: str) -> None:
         """Enter READY or FAULT."""
@@ -150,7 +150,7 @@ class Emergency(ActiveState):
     """EMERGENCY: the drums are locked."""
 
     def __init__(self, before: ActiveState, line: str) -> None:
-        """Lock the drums; the pose is no longer known."""
+        """Lock the drums, and forget the pose, which is no longer known."""
         c = before.context
         c.end_run(ExecutionStatus.EMERGENCY, line)
         c.homed = False
@@ -174,15 +174,15 @@ class HomingState(ActiveState):
         """Enter the state at rest."""
         context.enter(State.HOMING, "the operator named the pose")
         super().__init__(context)
-        self.homing = homing  # plan at the pose that the operator named, and comparison of samples with this plan
+        self.homing = homing  # plan at the pose that the operator named; it compares samples with this plan
         self._largest_tension = np.full(len(context.zero), np.inf)  # upper limits of the tensions during a jog [N]
 
     def jog(self, winch: int, by: float) -> None:
-        """Jog winch `winch` by the length `by` [m]. The other winches have no power. Only tensions are monitored."""
+        """Jog winch `winch` by the length `by` [m]. The other winches have no power; only tensions are monitored."""
         c = self.context
         if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stops.")
-        self._largest_tension = jog_tension_limits(self.homing, c.sample)
+        self._largest_tension = self.homing.jog_limits(c.sample)
         length, still = c.sample.length + c.zero, np.zeros(len(c.zero))
         begin = SetPoint(length, still, c.unknown, c.sender.tension, None, None, np.nan, False)
         self.source = HomingJog(begin, winch, by, c.period)
@@ -214,7 +214,7 @@ class HomingState(ActiveState):
         return self
 
     def _reason_to_end(self, sample: Sample) -> str:
-        """Return the reason to end a jog, or "" if it continues."""
+        """Reason to end the present jog; "" if the jog continues."""
         c = self.context
         stale = ~(sample.age <= FRESH * c.period)
         if stale.any():
@@ -245,6 +245,16 @@ class Following(ActiveState):
         context.enter(state, text)
         super().__init__(context, point, source)
         self._followed = source
+
+    @classmethod
+    def at_rest(cls, context: Context, found: Standing | ForwardStatus, reason: str) -> Following | None:
+        """Enter IDLE at the equilibrium `found`. If `found` is a status of failure, forget the pose and return None."""
+        context.previous_plan = None
+        if isinstance(found, Standing):
+            return cls(context, State.IDLE, reason, found.step(), found)
+        context.say(EventKind.NOTE, "estimate", f"no equilibrium at these lengths: {found.text}")
+        context.homed = False
+        return None
 
     def next(self, answer: Sample | Missing) -> ActiveState:
         """Command the next set point. Change to IDLE at the end of the source."""
@@ -278,10 +288,10 @@ class Following(ActiveState):
 
 
 class Stopping(ActiveState):
-    """STOPPING: a ramp begins at the last set point that was sent. All rates reach zero at the same time."""
+    """STOPPING: a ramp that begins at the last set point that was sent. All rates reach zero at the same time."""
 
     def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:
-        """Begin the ramp. The record of the motion receives `status` and `reason`."""
+        """Begin the ramp. `status` and `reason` are stored in the record of the motion."""
         c, point, source = before.context, before.point, before.source
         if point is not None:
             point = point._replace(done=False)
@@ -319,13 +329,3 @@ class Stopping(ActiveState):
         c.end_run(c.run.status, c.run.reason)
         c.sender.stand_at(c.sample, None if point is None else point.drum_tension)
         return Holding(c, self.after, c.run.reason)
-
-
-def idle_at(context: Context, found: Standing | ForwardStatus, reason: str) -> Following | None:
-    """Enter IDLE at the equilibrium `found`. If `found` is a status, forget the pose and return None."""
-    context.previous_plan = None
-    if isinstance(found, Standing):
-        return Following(context, State.IDLE, reason, found.step(), found)
-    context.say(EventKind.NOTE, "estimate", f"no equilibrium at these lengths: {found.text}")
-    context.homed = False
-    return None

@@ -17,16 +17,14 @@ from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.drum import drum_lever, drum_tension
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-START: Final = 2e-3  # [m], largest distance of the first pose of a path from the platform
 ON_TICK: Final = 1e-6  # largest distance of a sample from a tick, as a share of a period
 LARGEST_LEAD: Final = 5e-3  # [m], largest distance of a plan's first lengths from the lengths at rest
-ROUNDING: Final = 5e-6  # [m], allowed difference between lengths and integrated rates, without accelerations
+ROUNDING: Final = 5e-6  # [m], allowed difference between lengths and integrated rates if the accelerations are zero
 LARGEST_STEP: Final = 1e-3  # [m], larger steps count as a jump of an encoder
-AT_REST: Final = 1e-3  # [m/s] and [rad/s], largest speed at both ends of a path that causes no shock in the winches
+AT_REST: Final = 1e-3  # [m/s] and [rad/s], largest speed at both ends of a path; the winches tolerate such a jump
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +33,7 @@ class Motion:
 
     Attributes:
         period: Period of a cycle and time between two rows [s].
-        plan: Plan at the ticks. The last tick is at the end of the path or shortly after it. None for a jog.
+        plan: Plan at the ticks. The last tick is at the end of the path or less than a period later. None for a jog.
         state: Robot, poses and cables at the rows.
         length: Unstrained lengths off the drums [m], shape (N, m).
         rate: Rates of these lengths [m/s], shape (N, m); zero in the last row.
@@ -73,7 +71,7 @@ def plan_motion(
     method: TensionMethod,
     previous: Plan | Array | None = None,
 ) -> Motion:
-    """Plan `path` for cycles of `period` [s], and make all checks of the plan; `previous`: as in `inverse`."""
+    """Plan `path` for cycles of `period` [s], and check the plan completely. `previous`: as in `inverse`."""
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)
@@ -98,18 +96,8 @@ def plan_motion(
     )
 
 
-def check_motion(motion: Motion, robot: Robot, period: float) -> None:
-    """Reject `motion` if its plan is not for `robot`, or not for cycles of `period` [s]."""
-    step = "Plan the path with this controller: control.plan(path)."
-    if abs(motion.period - period) > ON_TICK * period:
-        reason = f"its plan is for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
-        raise RefusedError("the path", reason, step)
-    if motion.robot is not robot:
-        raise RefusedError("the path", f"its plan is for another robot, {motion.robot.name}", step)
-
-
 def check_lead(what: str, lead: Array) -> None:
-    """Reject a plan with too large differences `lead` [m], (m,), between its first lengths and the lengths at rest."""
+    """Reject a plan if its first lengths differ too much from the lengths at rest. `lead`: differences [m], (m,)."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
         away, allowed = f"{1e3 * lead[i]:+.3g} mm", f"{1e3 * LARGEST_LEAD:g} mm"
@@ -117,18 +105,8 @@ def check_lead(what: str, lead: Array) -> None:
         raise RefusedError(what, reason, "Jog the winches back, or home again.")
 
 
-def check_start(robot: Robot, here: Pose, start: Pose) -> None:
-    """Reject a motion whose first pose `start` is not the present pose `here`."""
-    points = np.vstack((np.zeros(3), robot.platform_anchors))
-    jump = float(np.linalg.norm(start.transform(points) - here.transform(points), axis=1).max())
-    if not jump <= START:
-        place = ", ".join(f"{x:.4f}" for x in here.position)
-        away = f"it begins {1e3 * jump:.3g} mm from the pose of the platform; allowed: {1e3 * START:g} mm"
-        raise RefusedError("the path", away, f"Go to the first pose, or begin the path at ({place}) m.")
-
-
 def _at_ticks(path: Path, period: float) -> Path:
-    """Samples of `path` at the ticks, one tick per `period` [s]. The end pose is held until the next tick."""
+    """Samples of `path` at the ticks, one tick per `period` [s]. The end pose is held until the tick after it."""
     time = path.time - path.time[0]
     count = int(np.floor(time[-1] / period + ON_TICK)) + 1
     ticks = np.asarray(period * np.arange(count), dtype=np.float64)
@@ -173,7 +151,7 @@ def _check_feasible(plan: Plan, path: Path) -> None:
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
     """Reject speeds and torques above the known limits of the winches."""
     winches = robot.winches
-    lever = drum_lever(robot, length)  # this call raises an error for missing data
+    lever = drum_lever(robot, length)  # the conversion raises an error if data of the winches are missing
     if winches is None:
         return
     ratio = np.abs(winches.gear) / lever  # rotation of the motor per length of cable [rad/m]
@@ -187,12 +165,12 @@ def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: A
 
 
 def _check_steps(time: Array, length: Array, rate: Array) -> None:
-    """Reject a path whose twists contradict its poses, because its lengths would not agree with their rates.
+    """Reject a path whose twists contradict its poses, because then the rates do not agree with the lengths.
 
     Within a step h, the rate is assumed to be between the rates at both ends. The change of length then differs from h
-    times the mean rate by at most h/2 times the difference of the rates. For this difference, the largest of the step
-    and its two neighbors is used. A deviation above the allowed jump of an encoder is never accepted. The steps are
-    between samples of the path, not between ticks, because the path may end before a tick.
+    times the mean rate by at most h/2 times the difference of the rates. The largest difference of the rates in this
+    step and its two neighbors is used. A deviation above the allowed jump of an encoder is never accepted. The steps
+    are between the samples of the path. Ticks are not used, because the path may end before a tick.
     """
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from math import nan
 from typing import Final
@@ -17,7 +18,7 @@ from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.faults import faults_of
 from sagline.control.link import PERIOD, Link, Sample
 from sagline.control.null_space import TensionLoop, TensionSettings
-from sagline.control.real_time import Garbage, Pace
+from sagline.control.real_time import Pace
 from sagline.control.recording import CycleTable, Event, EventKind, Journal, Recorded, Recorder
 from sagline.control.set_points import Along, Standing, standing_at
 from sagline.control.states import MOTION, RefusedError, State, check_transition
@@ -35,11 +36,11 @@ from sagline.tension.methods import DEFAULT, method_of
 
 MOST_SEED: Final = 2**128
 SAME: Final = 1e-9  # largest deviation of the period, as a share of the period
-MARGIN: Final = 500  # number of cycles in the table beyond the plan, for ramps and pauses
+MARGIN: Final = 500  # number of cycles in the table in addition to the plan, for ramps and pauses
 
 
-class Estimator:
-    """Forward kinematics of each sample. The search starts at the previous pose.
+class _Estimator:
+    """Forward kinematics of each sample. Each search starts at the previous pose.
 
     Attributes:
         position: Position of the platform's origin [m], shape (3,); NaN if it was never known.
@@ -67,7 +68,7 @@ class Estimator:
         self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
 
     def locate(self, length: Array, wrench: Array | None) -> ForwardStatus | None:
-        """Estimate the pose from `length` [m] and `wrench` or None. Return the status if the pose is newly lost."""
+        """Estimate the pose from `length` [m] and `wrench` (or None). Returns the status if the pose is newly lost."""
         position, quaternion = np.empty(3), np.empty(4)
         status = self._solver.step_into(length, position, quaternion, wrench)
         lost = status not in STABLE and self.status in STABLE
@@ -75,20 +76,40 @@ class Estimator:
         return status if lost else None
 
 
+class _Garbage:
+    """Switch for garbage collection, which is off during motion because it can take longer than a cycle."""
+
+    def __init__(self) -> None:
+        """Create the switch; nothing changes yet."""
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Switch collection off."""
+        if not self._stopped and gc.isenabled():
+            self._stopped = True
+            gc.disable()
+
+    def go_on(self) -> None:
+        """Switch collection on again, if it was on before `stop`."""
+        if self._stopped:
+            self._stopped = False
+            gc.enable()
+
+
 class _Run:
-    """The present or the last motion, and its record."""
+    """The present motion with its record; if the robot is at rest, the last motion."""
 
     def __init__(self) -> None:
         """Begin without a motion."""
-        self.motion: Motion | None = None  # planned motion; None for a platform jog, or before the first motion
+        self.motion: Motion | None = None  # planned motion; None for a jog of the platform, and before the first motion
         self.paused: Along | None = None
-        # status: final status; RUNNING before its end
+        # status: final status; RUNNING before the end of the motion
         # reason: reason of the status in one line
         self.status, self.reason = ExecutionStatus.RUNNING, ""
         self.first_event = 0
         self.table: CycleTable | None = None
         # recording: True if cycles are added to the table
-        # announced: True if the recorder has received the plan, and has not received its end
+        # announced: True between the messages to the recorder about the start and the end of the plan
         self.recording = self.announced = False
 
 
@@ -96,7 +117,7 @@ class Context:
     """Data and services that the states of a controller share.
 
     Attributes:
-        correction: Correction of the tension loop, added to the lengths of the plan [m], shape (m,).
+        correction: Lengths that the tension loop adds to the lengths of the plan [m], shape (m,).
     """
 
     def __init__(
@@ -128,9 +149,9 @@ class Context:
         self.shadow = flag(shadow, "shadow")
         self.random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))
         self.sender = Sender(m, self.random)
-        self.estimator = Estimator(robot, self.model)
+        self.estimator = _Estimator(robot, self.model)
         self.journal = Journal(record)
-        self.garbage = Garbage()
+        self.garbage = _Garbage()
         self.state = State.OFF
         self.sample: Sample | None = None  # newest sample; None before the first
         # zero: offset from homing, added to lengths of samples [m], shape (m,)
@@ -141,7 +162,7 @@ class Context:
         # time: time on the link's clock [s]
         self.number, self.time = 0, 0.0
         self.run = _Run()
-        # previous_plan: plan that the next plan continues, because the platform rests at its end; None otherwise
+        # previous_plan: plan at whose end the platform rests, so that the next plan can continue it; None otherwise
         self.previous_plan: Plan | None = None
         self.clear_faults()
         self.reset_tension_loop()
@@ -159,7 +180,7 @@ class Context:
             self.say(EventKind.FAULT, "recording stopped", line)
 
     def tell(self, what: Callable[[Recorder], object]) -> None:
-        """Call a method of the recorder, if a recorder exists."""
+        """Call a method of the recorder if there is a recorder."""
         if line := self.journal.tell(what):
             self.say(EventKind.FAULT, "recording stopped", line)
 
@@ -172,7 +193,7 @@ class Context:
     # samples, faults and estimate
 
     def check_agreement(self, what: str) -> Sample:
-        """Return the newest sample; raise an error if a group does not agree to the request `what`."""
+        """Newest sample of the machine. If a group does not agree, the error names the refused request `what`."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
         why, _ = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
@@ -181,7 +202,7 @@ class Context:
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:
-        """Estimate the pose; the tension loop's correction is excluded. Return a message if the pose is lost."""
+        """Estimate the pose, without the correction of the tension loop. Returns a message if the pose is lost."""
         length = sample.length + self.zero
         length -= self.correction
         lost = self.estimator.locate(length, wrench)
@@ -192,7 +213,7 @@ class Context:
         return line
 
     def find_faults(self, cycle: Cycle) -> tuple[Reaction, str]:
-        """Check all faults; return the strongest reaction, and the message of the first fault with this reaction."""
+        """Check all fault rules. Returns the strongest reaction, and the message of the first fault requiring it."""
         reaction, first, homing = Reaction.EVENT, "", False
         for fault in self.faults:
             line = fault.look(cycle)
@@ -222,7 +243,7 @@ class Context:
         self.correction = np.zeros(m)
 
     def find_equilibrium(self, length: Array) -> Standing | ForwardStatus:
-        """Equilibrium at `length` [m], (m,). The computation takes 1 ms, or up to 10 ms if the pose is unknown."""
+        """Equilibrium at `length` [m], (m,). The search takes 1 ms, or up to 10 ms if the pose is unknown."""
         return standing_at(self.robot, length, self.estimator.pose, self.model)
 
     # the running motion
@@ -235,20 +256,20 @@ class Context:
         run.table = CycleTable(self.robot.cable_count, len(self.link.groups), count)
         run.first_event = len(self.journal.events)
         if run.announced:
-            self._announce_end()  # end of the record of a paused plan
+            self._announce_end()  # the record of a paused plan ends here
         plan = None if motion is None else motion.plan
         if self.journal.watched and plan is not None:
             run.announced = True
             self.tell(lambda record: record.begins(plan))
 
     def continue_run(self) -> None:
-        """Start recording at this cycle, and disable garbage collection."""
+        """Record cycles from this cycle on, and disable garbage collection."""
         run = self.run
         run.recording, run.status, run.reason = True, ExecutionStatus.RUNNING, ExecutionStatus.RUNNING.text
         self.garbage.stop()
 
     def end_run(self, status: ExecutionStatus, reason: str) -> None:
-        """Store the final status of the motion, and enable garbage collection again."""
+        """End the record of the motion with its final status, and enable garbage collection again."""
         self.run.status, self.run.reason = status, reason
         self.garbage.go_on()
 
@@ -267,7 +288,7 @@ class Context:
         self.tell(lambda record: record.ends(self.run.status, self.run.reason))
 
     def execution(self) -> Execution | None:
-        """Record of the last motion until now; None before the first motion."""
+        """Record of the last motion up to now; None before the first motion."""
         run = self.run
         if run.table is None:
             return None

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.control.active_states import Following, HomingState
-from sagline.control.checks import Motion, check_lead, check_motion, check_start, plan_motion
+from sagline.control.checks import ON_TICK, Motion, check_lead, plan_motion
 from sagline.control.context import Context
 from sagline.control.execution import Execution
 from sagline.control.link import Link
@@ -18,28 +18,23 @@ from sagline.control.null_space import TensionSettings
 from sagline.control.preparation import Preparation
 from sagline.control.real_time import Pace, load_kernels
 from sagline.control.recording import Recorder
-from sagline.control.set_points import (
-    Along,
-    PlatformJog,
-    SetPoint,
-    SetPointSource,
-    Standing,
-    checked_displacement,
-    checked_winch,
-    winch_jog,
-)
+from sagline.control.set_points import Along, PlatformJog, SetPoint, SetPointSource, Standing, winch_jog
 from sagline.control.states import RefusedError, State, check_transition
-from sagline.core.arguments import instance
-from sagline.core.arrays import number
+from sagline.core.arguments import instance, whole_number
+from sagline.core.arrays import Array, checked, number
+from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
 from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
+START: Final = 2e-3  # [m], largest distance between the platform and the first pose of a path
 SPEED: Final = 0.1  # default speed of go_to [m/s]
 TURNING: Final = 0.2  # default angular speed of go_to [rad/s]
-SPEEDING_UP: Final = 0.5  # shortest time to full speed [s]; short paths are slow because of it
+MOST_WINCH: Final = 0.1  # largest jog of a winch [m]
+MOST_PLATFORM: Final = 0.2  # largest jog of the platform [m or rad]
+SPEEDING_UP: Final = 0.5  # shortest time to full speed [s]; it makes short paths slow
 
 
 class Controller(Preparation):
@@ -66,7 +61,7 @@ class Controller(Preparation):
         """Prepare the controller; nothing is sent.
 
         Args:
-            robot: Robot for planning. Its winches must have at least drum_radius.
+            robot: Robot for planning. The winches of the robot must have at least drum_radius.
             link: Connection to the machine.
             pace: Pace of cycles in real time. None for lockstep. A cycle then begins when the previous cycle ends, and
                 the machine and its clock wait for the controller.
@@ -74,9 +69,9 @@ class Controller(Preparation):
             tension: Tension distribution method; the default is `Closest`.
             loop: Settings of the tension loop. A robot without redundancy has no tension loop.
             record: Recorder of all cycles and events.
-            shadow: True for a controller that only reads. It never sends anything, and its state remains OFF.
-            seed: Seed of the controller's id and of random waiting times. None: the system chooses another seed for
-                every controller.
+            shadow: True for a controller that only reads: it never sends a command, and its state remains OFF.
+            seed: Seed of the controller's id and of random waiting times. None: every controller gets its own random
+                seed.
 
         Raises:
             InvalidValueError: If data of the winches are missing, `link` is for another number of winches, or an
@@ -108,7 +103,7 @@ class Controller(Preparation):
             A motion for `start` and `execute`.
 
         Raises:
-            RefusedError: If a check fails; the message names the check, the place on the path and the next step.
+            RefusedError: If a check fails: the message names the check, the place on the path and the next step.
         """
         c, given = self._context, instance(path, Path, "path")
         return self._result_of(partial(plan_motion, c.robot, given, c.period, c.model, c.method, c.previous_plan))
@@ -117,18 +112,18 @@ class Controller(Preparation):
         """Begin to follow a path.
 
         Args:
-            path: A motion of `plan`; or a path from rest to rest that has a sample at every tick and begins at the pose
-                of the platform.
+            path: A motion from `plan`, or a path. A path leads from rest to rest, has a sample at every tick, and
+                begins at the pose of the platform.
 
         Raises:
-            RefusedError: If the robot is not idle, a check fails, or the path begins at another pose.
+            RefusedError: If the robot is not idle. If a check fails. If the path begins at another pose.
         """
         check_transition(self.state, State.MOVING, "the path")
         motion = path if isinstance(path, Motion) else self.plan(path)
         check_transition(self.state, State.MOVING, "the path")
         self._context.check_agreement("the path")
-        check_motion(motion, self.robot, self.period)
-        check_start(self.robot, self.estimate, motion.state.pose[0])
+        _check_motion(motion, self.robot, self.period)
+        _check_start(self.robot, self.estimate, motion.state.pose[0])
         lead = self._set_point("the path").length - motion.length[0]
         check_lead("the path", lead)
         text = f"a path of {self.period * (len(motion) - 1):.2f} s"
@@ -141,7 +136,7 @@ class Controller(Preparation):
             path: As in `start`.
 
         Returns:
-            The execution. A fault is reported in its status, not as an error.
+            The execution. A fault does not raise an error: the status of the execution reports it.
 
         Raises:
             RefusedError: For the same reasons as `start`.
@@ -158,7 +153,7 @@ class Controller(Preparation):
             angular_speed: Largest angular speed of the platform [rad/s], > 0.
 
         Raises:
-            RefusedError: If the pose of the platform is unknown, or is already the requested pose.
+            RefusedError: If the pose of the platform is unknown. If the platform is already at `pose`.
         """
         limits = number(speed, "speed", "m/s", above=0.0), number(angular_speed, "angular_speed", "rad/s", above=0.0)
         here = self._here()
@@ -202,10 +197,11 @@ class Controller(Preparation):
             by: Change of length [m], positive if cable is paid out.
 
         Raises:
-            RefusedError: If the robot is neither idle nor in homing, or a tension would leave its limits.
+            RefusedError: If the robot is neither idle nor in homing. If a tension would leave its limits.
         """
         c = self._context
-        chosen, far = checked_winch(c.robot, winch, by)
+        chosen = whole_number(winch, "winch", 0, c.robot.cable_count - 1)
+        far = _at_most(number(by, "by", "m"), "m", MOST_WINCH)
         if isinstance(self._loop.active, HomingState):
             self._loop.active.jog(chosen, far)
             return
@@ -237,9 +233,9 @@ class Controller(Preparation):
             by: Displacement [m], shape (3,), or displacement and rotation vector [m, rad], shape (6,), world axes.
 
         Raises:
-            RefusedError: If the robot is not idle, or if no tensions within the limits hold the platform at the end.
+            RefusedError: If the robot is not idle. If no tensions within the limits hold the platform at the end.
         """
-        c, far = self._context, checked_displacement(by)
+        c, far = self._context, _checked_displacement(by)
         check_transition(self.state, State.JOGGING, "the jog")
         c.check_agreement("the jog")
         here, point = self._here(), self._set_point("the jog")
@@ -259,7 +255,7 @@ class Controller(Preparation):
         self._run_while(lambda: self.moving)
 
     def wait(self) -> Execution:
-        """Run cycles until the motion ends; Ctrl-C stops the robot and then raises KeyboardInterrupt.
+        """Run cycles until the motion ends. Ctrl-C stops the robot, and then KeyboardInterrupt is raised.
 
         Returns:
             The execution of the motion.
@@ -288,22 +284,22 @@ class Controller(Preparation):
         self._loop.active = Following(self._context, State.PAUSING, text, active.point, active.source)
 
     def resume(self) -> None:
-        """Continue the path at the point where `pause` stopped.
+        """Continue the path at the point where `pause` stopped the platform.
 
         Raises:
-            RefusedError: If there is no paused path, or the platform is at another pose.
+            RefusedError: If no path is paused. If the platform is no longer at the pose of the pause.
         """
         check_transition(self.state, State.MOVING, "resuming")
         run = self._context.run
         if run.paused is None:
             raise RefusedError("resuming", "no path was paused here", "Begin a path with start(path).")
         self._context.check_agreement("resuming")
-        check_start(self.robot, self.estimate, run.paused.pose)
+        _check_start(self.robot, self.estimate, run.paused.pose)
         source, run.paused = run.paused, None
         source.resume()
         self._follow(State.MOVING, source, f"continues at {source.clock:.2f} s of the path")
 
-    # shared by the methods above
+    # the methods above share these functions
 
     def _begin(self, state: State, source: SetPointSource, motion: Motion | None, text: str) -> None:
         """Begin to follow the set points of `source`, and start the record of the motion."""
@@ -323,7 +319,46 @@ class Controller(Preparation):
         return point
 
     def _here(self) -> Pose:
-        """Planned pose of the platform at rest. The estimated pose has additional noise."""
+        """Planned pose of the platform at rest, because the estimated pose contains noise."""
         source = self._loop.active.source
         pose = source.pose if isinstance(source, Standing) else None
         return self.estimate if pose is None else pose
+
+
+def _check_motion(motion: Motion, robot: Robot, period: float) -> None:
+    """Reject `motion` if its plan is not for `robot`, or not for cycles of `period` [s]."""
+    step = "Plan the path with this controller: control.plan(path)."
+    if abs(motion.period - period) > ON_TICK * period:
+        reason = f"its plan is for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
+        raise RefusedError("the path", reason, step)
+    if motion.robot is not robot:
+        raise RefusedError("the path", f"its plan is for another robot, {motion.robot.name}", step)
+
+
+def _check_start(robot: Robot, here: Pose, start: Pose) -> None:
+    """Reject a motion if its first pose `start` differs from the present pose `here`."""
+    points = np.vstack((np.zeros(3), robot.platform_anchors))
+    jump = float(np.linalg.norm(start.transform(points) - here.transform(points), axis=1).max())
+    if not jump <= START:
+        place = ", ".join(f"{x:.4f}" for x in here.position)
+        away = f"it begins {1e3 * jump:.3g} mm from the pose of the platform; allowed: {1e3 * START:g} mm"
+        raise RefusedError("the path", away, f"Go to the first pose, or begin the path at ({place}) m.")
+
+
+def _checked_displacement(by: ArrayLike) -> Array:
+    """Check the displacement `by`, with or without a rotation vector. Returns both, (6,), by default no rotation."""
+    given = checked(by, "by", "m or rad")
+    if given.shape not in ((3,), (6,)):
+        step = "Give a displacement, or a displacement and a rotation vector."
+        raise InvalidValueError("by", f"of shape {given.shape}", "shape (3,) or (6,)", step)
+    whole = np.zeros(6)
+    whole[: given.size] = given
+    for part, unit in ((whole[:3], "m"), (whole[3:], "rad")):
+        _at_most(float(np.linalg.norm(part)), unit, MOST_PLATFORM)
+    return whole
+
+
+def _at_most(by: float, unit: str, most: float) -> float:
+    if abs(by) <= most:
+        return by
+    raise InvalidValueError("by", f"{by:g} {unit}", f"up to {most:g} {unit} at a time", "Jog in parts, or use go_to.")

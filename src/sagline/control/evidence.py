@@ -14,18 +14,18 @@ from sagline.control.null_space import SIGMAS, NullSpace, extrema, finite, large
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
 
-MOVING: Final = 1e-3  # [m/s], a set point that changes faster counts as a motion
+MOVING: Final = 1e-3  # [m/s], a motion: set points change faster than this
 
 
 class Cycle(NamedTuple):
-    """Data of one cycle for the fault rules, collected between the sample and the next command.
+    """Data of one cycle for the fault rules, collected after the sample and before the next command.
 
     Attributes:
         sample: The newest sample.
         before: Sample of the previous cycle; None in the first.
         command: Command sent in the previous cycle; None if nothing was sent.
         tension: Planned T_A for this cycle [N], shape (m,); NaN without a plan, for example before homing.
-        gains: Gains of the tension loop at this time of the plan; None without gains.
+        gains: Gains of the tension loop at this time of the plan; None if the plan has no gains.
         correction: Correction of the plan's lengths by the tension loop [m], shape (m,).
         late: Delay of the start of the cycle [s]; 0 in lockstep.
         recording: Reason why recording has stopped; "" otherwise.
@@ -42,17 +42,17 @@ class Cycle(NamedTuple):
 
     @property
     def moving(self) -> bool:
-        """True if set points change."""
+        """True if the set points of this cycle change."""
         command = self.command
         return command is not None and command.mode == Mode.FOLLOW and bool(abs(command.rate).max() > MOVING)
 
 
 SLACK_SHARE: Final = 0.3  # a cable is slack if its tension is below this share of the lower limit
-PLANNED_SHARE: Final = 0.9  # a cable is taut in the plan if the planned tension is above this share of the lower limit
+PLANNED_SHARE: Final = 0.9  # a cable is planned as taut if its planned tension is above this share of the lower limit
 PULLING: Final = 0.5  # a cable is taut if the motor torque is above this share of the planned tension
 STEADY_TIME: Final = 0.5  # time constant of the filter for the constant part of the tension errors [s]
-QUICK_TIME: Final = 0.1  # time constant of the filter for the comparison with the platform's force balance [s]
-MOST_CHANGE: Final = 6.0  # largest change of the quick filter [N per cycle]; this limit suppresses single outliers
+QUICK_TIME: Final = 0.1  # time constant of the filter for tensions in the comparison with the force balance [s]
+MOST_CHANGE: Final = 6.0  # largest change of the quick filter [N per cycle]; it suppresses single outliers
 _TRIPPED: Final = int(WinchState.FAULT)
 
 
@@ -67,7 +67,7 @@ class Evidence:
         cell: tuple[float, float],
         largest: float,
     ) -> None:
-        """Begin without evidence; `period` [s]; `cell`: deviation, bias [N]; `largest`: limit of a correction [m]."""
+        """Begin without readings. `period` [s]. `cell`: deviation, bias [N]. `largest`: limit of a correction [m]."""
         m, winch = robot.cable_count, robot.winches
         self.group_of = np.zeros(m, dtype=np.int64)  # index of the group of each winch, shape (m,)
         for g, members in enumerate(groups_of(m) if groups is None else groups):
@@ -76,7 +76,7 @@ class Evidence:
         # largest: largest correction of a length without a fault [m]
         self.period, self.largest = period, largest
         # noise: standard deviation of a reading [N]
-        # sigma: standard deviation of a reading, increased by the bias of a good cell [N]
+        # sigma: the same, increased by the bias of a good cell [N]
         self.noise, self.sigma = cell[0], math.hypot(*cell)
         self.limit = robot.tension_max  # upper limits of T_A [N], shape (m,)
         least = robot.tension_min
@@ -87,23 +87,23 @@ class Evidence:
         # full_scale: full scale of the cells [N], infinite if unknown, shape (m,)
         self.full_scale = np.broadcast_to(winch.load_cell_range if known else np.inf, (m,))  # type: ignore[union-attr, arg-type]
         self._set_up_motors(robot)
-        self.believed: Flags = np.ones(m, dtype=bool)  # True for cells whose readings are used, shape (m,)
+        self.believed: Flags = np.ones(m, dtype=bool)  # True for load cells whose readings are used, shape (m,)
         self.broken: Flags = np.zeros(m, dtype=bool)  # True for broken cables, shape (m,)
         self.jumped: Flags = np.zeros(m, dtype=bool)  # True for encoders that have jumped, shape (m,)
-        # low: number of consecutive new readings at which the cable is slack, but taut in the plan, shape (m,)
+        # low: number of consecutive new readings of a slack cable that is taut in the plan, shape (m,)
         self.low = np.zeros(m, dtype=np.int64)
-        self.before_low = np.full(m, np.nan)  # last reading before the readings of a slack cable [N], shape (m,)
+        self.before_low = np.full(m, np.nan)  # last reading before the cable became slack [N], shape (m,)
         self._filtered, self._change = np.zeros((2, m)), np.empty((2, m))
         # steady: T_A minus the plan after the slow filter [N], shape (m,); constant while a cable is slack
         # quick: T_A minus the plan after the quick filter [N], shape (m,)
         self.steady, self.quick = self._filtered
-        # stopped: True while a reported fault stops the motion and the winches still move
+        # stopped: True while the winches still move after a fault that stops the motion
         # compared: True if tensions can be compared with a plan
         self.compared = self.any_low = self.stopped = False
         # plain: True if no cell is ignored and all readings are finite
         self.plain, self._all_believed = True, True
         self._still, self._settled = 0, round(RAMP / period)
-        # full-size arrays, because numpy is three times slower with scalars or columns
+        # arrays of full size, because numpy is three times slower with scalars or columns
         self._shares = np.array([[period / (time + period)] * m for time in (STEADY_TIME, QUICK_TIME)])
         self.cycle: Cycle | None = None
         # tension: T_A [N], shape (m,): the reading if it is finite and the cell is not ignored, otherwise the planned
@@ -152,11 +152,11 @@ class Evidence:
         self._all_believed = False
 
     def stop(self) -> None:
-        """Store that a fault stops the motion. Until the winches stop, further faults are mostly its consequences."""
+        """Store that a fault stops the motion. Until the winches stop, other faults are mostly consequences of it."""
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:
-        """Check if the winches have stopped. The set points decide; without set points, new measured rates decide."""
+        """Check if the winches have stopped, by the set points or, without set points, by new measured rates."""
         moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
         self._still = 0 if moves else self._still + 1
         self.stopped = self._still <= self._settled
@@ -205,7 +205,7 @@ class Evidence:
         change[:] = error
         change -= self._filtered
         change *= self._shares
-        if (most := largest(change[1])) > MOST_CHANGE:  # a common factor for all errors does not change their direction
+        if (most := largest(change[1])) > MOST_CHANGE:  # one factor keeps the ratios of the errors
             change[1] *= MOST_CHANGE / most
         if self.any_low:
             change[0] = 0.0
@@ -226,13 +226,13 @@ class Reaction(IntEnum):
     """Reaction to a fault. If there are several faults, the strongest reaction is executed."""
 
     EVENT = 0  # reported and recorded
-    DEGRADED = 1  # the tension loop keeps its correction; the motion continues
+    DEGRADED = 1  # the motion continues, and the tension loop keeps its correction
     STOPPING = 2  # ramp of all rates to zero, then FAULT
     EMERGENCY = 3  # drums locked, no motion possible
 
 
 class Fault(ABC):
-    """Base class of a fault rule. `faults_of` creates a set of rules, again after each acknowledged fault.
+    """Base class of a fault rule. `faults_of` creates a set of rules, and a new set after each acknowledged fault.
 
     Attributes:
         name: Name of its events.
@@ -240,8 +240,8 @@ class Fault(ABC):
         reaction: Reaction of the controller.
         within: Longest time until the fault is detected, as text.
         homing: True if the robot must be homed again after the fault, because a length is unreliable.
-        lasting: True if the fault remains until a new set of rules is created; each faulty item is reported once.
-        quiet: Time after a report [s]. Repeated faults in this time are only counted.
+        lasting: True if the fault remains until a new set of rules is created. Each faulty item is reported once.
+        quiet: Time after a report [s] in which repeated faults are only counted.
         present: True if the condition holds. While another fault stops the winches, the value does not change.
         seen: Evidence, which all rules of the set use.
     """
@@ -261,8 +261,8 @@ class Fault(ABC):
             seen: Evidence that all rules of the set use.
         """
         self.seen, self.present = seen, False
-        self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples with the condition
-        self._since_report, self._suppressed = 10**9, 0  # cycles since the last report, and suppressed repeats
+        self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples with a true condition
+        self._since_report, self._suppressed = 10**9, 0  # number of cycles since the last report, and repeats in them
 
     def look(self, cycle: Cycle) -> str | None:
         """Check one cycle. Call this method once for every cycle, in order.
@@ -272,15 +272,15 @@ class Fault(ABC):
 
         Returns:
             Message for the operator in the cycle in which the fault begins: fault, item, value, limit, next step. None
-            in all other cycles. If a fault begins while another fault stops the winches, it is reported after the stop,
+            in all other cycles. A fault that begins while another fault stops the winches is reported after the stop,
             if it is still present.
         """
         if cycle is not self.seen.cycle:  # the first rule updates the evidence for all rules
             self.seen.at(cycle)
-        # a fault during a stop is mostly a consequence of the stop, but a fault with an unreliable length is reported
+        # a fault during a stop is mostly a consequence of the stop; it is reported only if it makes a length unreliable
         waits = False
         if self.seen.stopped and self.reaction is Reaction.STOPPING and not self.homing:
-            if self.lasting:  # each item is reported once
+            if self.lasting:  # a faulty item is reported once
                 return None
             waits = not self.present
         line = self.found(cycle)
@@ -298,7 +298,7 @@ class Fault(ABC):
         return self._without_repeats(line) if begins else None
 
     def _without_repeats(self, line: str) -> str | None:
-        """Suppress repeats within `quiet` seconds."""
+        """Message `line`, or None if it repeats a report within `quiet` seconds."""
         if not self.quiet:
             return line
         if self._since_report * self.seen.period <= self.quiet:
@@ -310,7 +310,7 @@ class Fault(ABC):
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the operator in each cycle with a true condition; for a lasting fault, only about new items.
+        """Message for the operator in each cycle in which the condition holds; a lasting fault reports only new items.
 
         Args:
             cycle: Readings and set points of the cycle.

@@ -77,7 +77,7 @@ class Samples(Result):
     discarded: Indices
 
     def __len__(self) -> int:
-        """Number of samples."""
+        """Number of samples N."""
         return len(self.time)
 
     def at(self, index: int) -> Sample:
@@ -96,18 +96,18 @@ class Samples(Result):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Execution(Result, Saved, Tabular):
-    """Execution of a plan on a machine, in N cycles of m winches.
+    """Execution of a plan on a machine with m winches, in N cycles.
 
-    In each cycle, a command is sent and a sample is received at the same time. The sample therefore does not show the
-    effect of this command.
+    In each cycle, a command is sent and a sample is received at the same time. The command therefore has no effect on
+    this sample.
 
     Attributes:
         robot: Robot of the controller.
         plan: Whole plan; None without a plan, for example for a jog.
-        status: Status at the end.
+        status: Status at the end of the execution.
         reason: Reason for the end in one line.
         period: Period of a cycle [s].
-        zero: Offset from homing, added to the lengths of samples [m], shape (m,).
+        zero: Offset from homing that is added to the lengths of samples [m], shape (m,).
         events: Events during the motion.
         time: Time on the link's clock [s], shape (N,).
         answered: True for cycles with a sample, shape (N,).
@@ -123,7 +123,7 @@ class Execution(Result, Saved, Tabular):
         set_rate: Set points of the length rates [m/s], shape (N, m).
         set_tension: Set points of the tensions at the drums [N], shape (N, m).
         planned_tension: Planned T_A at the time of each sample [N], shape (N, m); NaN without a plan.
-        correction: Correction by the tension loop, included in the set points [m], shape (N, m).
+        correction: Correction by the tension loop [m], which the set points include, shape (N, m).
     """
 
     _columns: ClassVar[Columns] = (
@@ -249,7 +249,7 @@ def position_error(execution: Execution) -> Array:
 
 
 def null_space_error(execution: Execution, filter_time: float | None = None) -> Array:
-    """Tension errors in the null space of the structure matrix, as in the tension loop.
+    """Tension errors in the null space of the structure matrix, computed as in the tension loop.
 
     Args:
         execution: N cycles.

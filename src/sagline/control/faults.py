@@ -1,4 +1,4 @@
-"""Faults of the exchange between controller and machine, table of all faults, and creation of the rules."""
+"""Faults in the exchange between controller and machine, the table of all faults, and the creation of the rules."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
-from sagline.control.faults_cables import CableBroken, CellDead, CellLost, CellOff, CellStuck, OverTension, Slack
-from sagline.control.faults_drives import CorrectionAtLimit, EncoderJump, FollowingError, NotFollowing, ServoSaturated
+from sagline.control.faults_cables import CABLE_FAULTS
+from sagline.control.faults_drives import DRIVE_FAULTS
 from sagline.control.link import CHECK, PERIOD, GroupFault, GroupStatus, Mode, WinchState, fault_text
 from sagline.control.null_space import TensionSettings, cell_errors
 from sagline.core.arguments import brief, instance
@@ -21,7 +21,7 @@ STALE, SILENT = 3, 10  # largest age of a sample [cycles]
 WINDOW: Final = 100  # length of the window in which late cycles are counted [cycles]
 LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # delay of a late cycle [s]
 OFTEN: Final = 3  # largest number of late cycles per window
-ROUNDING: Final = 1e-6  # tolerance of an age, as a share of it
+ROUNDING: Final = 1e-6  # relative tolerance of an age
 
 # plain integers, because array operations with members of an enumeration are four times slower
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
@@ -31,7 +31,7 @@ _FREE: Final = "Stop other programs on this computer."
 
 
 class _Old(Fault):
-    """Group whose newest sample is too many cycles old."""
+    """Base class for a group whose newest sample is too many cycles old."""
 
     cycles: int
     step: str
@@ -46,8 +46,8 @@ class _Old(Fault):
         return f"group {group}: {what}. {self.step}"
 
 
-class GroupStale(_Old):
-    """Late group: the tension loop is off until the group answers again."""
+class _GroupStale(_Old):
+    """Group that answers late. The tension loop is off until the group answers again."""
 
     name = "group stale"
     rule = f"the newest sample of a group is {STALE} cycles old, as blocks are missing, repeated, late or invalid"
@@ -58,7 +58,7 @@ class GroupStale(_Old):
     step = "The tension loop is off until the group answers."
 
 
-class GroupSilent(_Old):
+class _GroupSilent(_Old):
     """Group that does not answer."""
 
     name = "group silent"
@@ -69,8 +69,8 @@ class GroupSilent(_Old):
     step = f"{CHECK}, then acknowledge."
 
 
-class BlockDiscarded(Fault):
-    """Group that sends invalid blocks. If it sends no valid block, it becomes late and then silent."""
+class _BlockDiscarded(Fault):
+    """Group that sends invalid blocks. A group without valid blocks counts first as late and then as silent."""
 
     name = "block discarded"
     rule = "incomplete or foreign (by its counters, magic, version or size), repeated, or older than an earlier block"
@@ -96,7 +96,7 @@ class BlockDiscarded(Fault):
         return self._line if self._quiet < WINDOW else None
 
 
-class OwnerLost(Fault):
+class _OwnerLost(Fault):
     """Group that the controller no longer owns."""
 
     name = "owner lost"
@@ -117,8 +117,8 @@ class OwnerLost(Fault):
         return f"group {group}: {who}; expected: {command.owner}. Stop the other controller, then connect again."
 
 
-class GroupActs(Fault):
-    """Group that its PLC or a drive has stopped."""
+class _GroupActs(Fault):
+    """Group that has stopped because of its PLC or one of its drives."""
 
     name = "group acts by itself"
     rule = "a PLC reports a fault or locked drums, or a drive reports a fault"
@@ -132,7 +132,7 @@ class GroupActs(Fault):
         self._reported: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the groups that have newly stopped, with the reason of the first group."""
+        """Message for the groups that have stopped since the last cycle, with the reason of the first group."""
         seen, sample = self.seen, cycle.sample
         if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
             return None
@@ -141,7 +141,7 @@ class GroupActs(Fault):
         tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
         acting = (sample.fault != 0) | ((sample.status & _LOCKED) != 0)
         acting[seen.group_of[tripped]] = True
-        acting &= (sample.status & _EMERGENCY) == 0  # the groups are locked as required
+        acting &= (sample.status & _EMERGENCY) == 0  # the controller itself has locked the groups
         acting &= sample.fault != _PRESSED
         new = acting & ~self._reported
         if not new.any():
@@ -159,7 +159,7 @@ class GroupActs(Fault):
         return ", and ".join(filter(None, (fault_text(code) if code else "", "drums are locked" if locked else "")))
 
 
-class EmergencyStop(Fault):
+class _EmergencyStop(Fault):
     """Emergency stop of the hardware, reported by the PLC."""
 
     name = "emergency stop"
@@ -180,7 +180,7 @@ class EmergencyStop(Fault):
         return f"emergency stop, reported by group {groups}. Make the machine safe, release it, then connect and home."
 
 
-class CycleLate(Fault):
+class _CycleLate(Fault):
     """Cycles that are late because the computer is too busy."""
 
     name = "cycle late"
@@ -192,7 +192,7 @@ class CycleLate(Fault):
         """Create the rule without late cycles."""
         super().__init__(seen)
         self._cycle = 0
-        self._late: deque[tuple[int, float]] = deque()  # times and delays in the window
+        self._late: deque[tuple[int, float]] = deque()  # times and delays of late cycles in the window
 
     def found(self, cycle: Cycle) -> str | None:
         """Message for the longest delay of the last second, or for the number of late cycles."""
@@ -215,8 +215,8 @@ class CycleLate(Fault):
         )
 
 
-class CycleLost(Fault):
-    """Cycle that is so late that the PLCs have stopped the winches."""
+class _CycleLost(Fault):
+    """Cycle that began so late that the PLCs have stopped the winches."""
 
     name = "cycle lost"
     rule = f"> {1e3 * LOST:g} ms late"
@@ -224,7 +224,7 @@ class CycleLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the delay of the cycle."""
+        """Message that gives the delay of the cycle."""
         if cycle.late <= LOST:
             return None
         return (
@@ -233,7 +233,7 @@ class CycleLost(Fault):
         )
 
 
-class RecordingStopped(Fault):
+class _RecordingStopped(Fault):
     """Recording that has stopped; the motion continues."""
 
     name = "recording stopped"
@@ -251,34 +251,17 @@ class RecordingStopped(Fault):
 
 LARGEST_CORRECTION: Final = TensionSettings().largest  # largest correction of the tension loop [m]
 
-# in the order of evaluation, because a lost or dead cell must be found before its cable counts as slack
+# in the order of evaluation
 FAULTS: Final[tuple[type[Fault], ...]] = (
-    EmergencyStop,
-    OwnerLost,
-    GroupActs,
-    GroupSilent,
-    GroupStale,
-    BlockDiscarded,
-    CellLost,
-    CellDead,
-    CellStuck,
-    CellOff,
-    OverTension,
-    CableBroken,
-    Slack,
-    EncoderJump,
-    FollowingError,
-    NotFollowing,
-    ServoSaturated,
-    CorrectionAtLimit,
-    CycleLost,
-    CycleLate,
-    RecordingStopped,
+    *(_EmergencyStop, _OwnerLost, _GroupActs, _GroupSilent, _GroupStale, _BlockDiscarded),
+    *CABLE_FAULTS,
+    *DRIVE_FAULTS,
+    *(_CycleLost, _CycleLate, _RecordingStopped),
 )
 
 
 class FaultRow(NamedTuple):
-    """Row of the fault table in the documentation.
+    """Row of the table of faults in the documentation.
 
     Attributes:
         name: Name of its events.
@@ -297,11 +280,7 @@ class FaultRow(NamedTuple):
 
 _ELSEWHERE: Final = (
     FaultRow(
-        "controller dead",
-        "the command counter does not change for 100 ms",
-        "ramp of 0.2 s, hold",
-        "300 ms",
-        "each PLC",
+        "controller dead", "the command counter does not change for 100 ms", "ramp of 0.2 s, hold", "300 ms", "each PLC"
     ),
     FaultRow("foreign block", "magic, version, group or size differ on connection", "OFF", "1 cycle", "the connection"),
     FaultRow("second controller", "another controller owns a group on connection", "OFF", "1 cycle", "the connection"),
@@ -328,13 +307,13 @@ def faults_of(
         robot: Robot for planning.
         period: Period of a cycle [s], > 0.
         groups: Winches of each group, as in the link; None for groups of two neighboring winches.
-        cell_deviation: Standard deviation of a good load cell [N], > 0; None: the value of the robot's winches, or 1 N
-            if they have no value.
-        cell_bias: Largest bias of a good load cell [N], >= 0; None: the value of the robot's winches, and at least 2 N.
+        cell_deviation: Standard deviation of a good load cell [N], > 0. None: the value of the robot's winches, by
+            default 1 N.
+        cell_bias: Largest bias of a good load cell [N], >= 0. None: the value of the robot's winches, but at least 2 N.
         largest_correction: Largest correction of a length by the tension loop [m], > 0.
 
     Returns:
-        The rules. Evaluate all of them in every cycle, in this order.
+        The rules. Evaluate all rules in every cycle, in the order of the list.
 
     Raises:
         InvalidValueError: If an argument has the wrong type or is out of its range.

@@ -12,13 +12,13 @@ from sagline.control.link import Mode
 from sagline.control.null_space import SIGMAS, largest
 from sagline.core.arrays import Array
 
-NEAR: Final = 0.9  # share of the upper limit; the motion stops if the tension is above it for some samples
+NEAR: Final = 0.9  # the motion stops if the tension is above this share of the upper limit for some samples
 NEAR_SAMPLES, SLACK_SAMPLES = 5, 3
-SUDDEN: Final = 0.5  # share of the planned tension that a broken cable had at least, one sample before the break
+SUDDEN: Final = 0.5  # least tension of a cable one sample before it breaks, as a share of the planned tension
 
 
-class OverTension(Fault):
-    """Cable tension too large."""
+class _OverTension(Fault):
+    """Cable whose tension is too large."""
 
     name = "over-tension"
     rule = f"T_A above its upper limit in one sample, or above {NEAR:g} of this limit in {NEAR_SAMPLES} samples"
@@ -50,8 +50,8 @@ class OverTension(Fault):
         )
 
 
-class CableBroken(Fault):
-    """Broken cable: the other tensions change at the same time."""
+class _CableBroken(Fault):
+    """Broken cable. The tensions of the other cables change at the same time."""
 
     name = "cable broken"
     rule = (
@@ -64,7 +64,7 @@ class CableBroken(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first cable that is newly broken."""
+        """Message for the first cable that has broken since the last cycle."""
         seen = self.seen
         if not (seen.any_low and seen.compared):
             return None
@@ -85,8 +85,8 @@ class CableBroken(Fault):
         )
 
 
-class Slack(Fault):
-    """Cable that is slack, but taut in the plan."""
+class _Slack(Fault):
+    """Cable that is slack, although the plan requires it to be taut."""
 
     name = "slack"
     rule = (
@@ -113,12 +113,12 @@ class Slack(Fault):
 
 
 STUCK_SAMPLES: Final = 50
-ODD_TIME: Final = 0.35  # duration of the contradiction [s]; ramps and oscillations of the platform are shorter
-DISPROVED: Final = 0.5  # share of full scale; a full-scale reading is wrong if the motor holds less tension
+ODD_TIME: Final = 0.35  # duration of a contradiction between cell and plan [s]; ramps and oscillations are shorter
+DISPROVED: Final = 0.5  # a full-scale reading is wrong if the motor holds less than this share of full scale
 _STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform is at rest, then acknowledge."
 
 
-class CellLost(Fault):
+class _CellLost(Fault):
     """Load cell without a reading during a motion, so that the tension of its cable is not monitored."""
 
     name = "cell lost"
@@ -144,7 +144,7 @@ class CellLost(Fault):
         )
 
 
-class CellDead(Fault):
+class _CellDead(Fault):
     """Load cell with an impossible reading."""
 
     name = "cell zero or saturated"
@@ -181,7 +181,7 @@ class CellDead(Fault):
         return f"cell {cell} {reads}{holds}{planned}. {_STEP}"
 
 
-class CellStuck(Fault):
+class _CellStuck(Fault):
     """Load cell with a constant reading."""
 
     name = "cell stuck"
@@ -191,7 +191,7 @@ class CellStuck(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first cell that is newly stuck."""
+        """Message for the first cell that has become stuck since the last cycle."""
         seen = self.seen
         if cycle.before is None:
             return None
@@ -203,7 +203,7 @@ class CellStuck(Fault):
             return None
         same = tension == before
         self._for = np.where(same, self._for + seen.fresh, 0)
-        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # number of samples that repeat the first one
+        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # number of samples that repeat the first sample
         if not stuck.any():
             return None
         seen.ignore_cells(stuck)
@@ -212,7 +212,7 @@ class CellStuck(Fault):
         return f"cell {cell} has read {reading:.4g} N in {STUCK_SAMPLES} samples of a motion. {_STEP}"
 
 
-class CellOff(Fault):
+class _CellOff(Fault):
     """Load cell that contradicts the force balance of the platform."""
 
     name = "cell wrong"
@@ -239,7 +239,7 @@ class CellOff(Fault):
                 self._side.fill(0.0)
                 self._quiet = True
             return None
-        # oscillations of the platform change their sign within ODD_TIME; the filter is fast enough for this
+        # an oscillation of the platform changes its sign within ODD_TIME; the filter is fast enough to show this
         side = np.sign(error) * (np.abs(error) > limit)
         self._for = np.where(side != 0.0, np.where(side == self._side, self._for + 1, 1), 0)
         self._side = side
@@ -262,3 +262,7 @@ class CellOff(Fault):
             return None
         error: Array = cycle.gains.parity.dot(seen.quick)
         return error
+
+
+# in the order of evaluation: a lost or dead cell must be found before its cable counts as slack
+CABLE_FAULTS: Final = (_CellLost, _CellDead, _CellStuck, _CellOff, _OverTension, _CableBroken, _Slack)

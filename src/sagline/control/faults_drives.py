@@ -1,4 +1,4 @@
-"""Faults of encoders and drives, and faults found by the tension loop."""
+"""Faults of encoders and drives, and faults that the tension loop detects."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from sagline.control.link import CHECK, COUNTERS, Command, GroupStatus, Mode, Sa
 from sagline.control.null_space import finite, largest
 from sagline.core.arrays import Array
 
-JUMP: Final = 1e-3  # largest jump [m per cycle]
-OFF_BEAT: Final = 1.5  # allowed difference between the numbers of elapsed cycles and of commands that a PLC accepted
-CATCHING_UP: Final = 10  # wait after a larger difference [cycles]
+JUMP: Final = 1e-3  # largest jump of a length [m per cycle]
+OFF_BEAT: Final = 1.5  # allowed difference between the number of cycles and the number of commands that a PLC accepted
+CATCHING_UP: Final = 10  # number of cycles without a check after a larger difference
 FOLLOWING: Final = 5e-3  # largest distance from a set point [m]
 SATURATED: Final = 0.2  # duration of the fault [s]
 IDLE: Final = 3  # number of samples in which a group must begin to follow
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
 _FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
-REMEMBERED: Final = 32  # [commands], more commands than can be in transit
-LONGEST: Final = 1.0  # longest time between two samples of a PLC [s]; after a longer time, the clock was reset
+REMEMBERED: Final = 32  # number of stored commands; fewer commands than this are in transit at one time
+LONGEST: Final = 1.0  # longest time between two samples of a PLC [s]; a longer time means that its clock was reset
 
 
-class EncoderJump(Fault):
-    """Encoder with inconsistent length and rate."""
+class _EncoderJump(Fault):
+    """Encoder whose length contradicts its rate."""
 
     name = "encoder jump"
     rule = (
@@ -42,7 +42,7 @@ class EncoderJump(Fault):
         """Create the rule without a sample."""
         super().__init__(seen)
         self._numbers = False  # False for encoders whose previous reading was not finite
-        self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # cycles with commands, for each group
+        self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # cycles with a command each, per group
 
     def found(self, cycle: Cycle) -> str | None:
         """Message for the largest jump, or for a reading that is not finite."""
@@ -60,7 +60,7 @@ class EncoderJump(Fault):
         return self._jump(cycle, sample, before) if known and before is not None else None
 
     def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
-        """Message if the change of a length contradicts the previous rate. The rate after a jump may be wrong."""
+        """Message if the change of a length contradicts the previous rate. The new rate may be wrong after a jump."""
         passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
         change = sample.length - before.length
         jump = change - before.rate * passed
@@ -69,12 +69,12 @@ class EncoderJump(Fault):
         jump = np.abs(jump)
         if cycle.command is not None:
             jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
-        # only drives that follow: a locked drum stops immediately, and the cable moves a drive at its force limit
+        # only drives that follow their set points: a locked drum stops at once, and a cable moves a drive at its limit
         free = (sample.state == _ENABLED) & (before.state == _ENABLED)
         free &= (passed >= 0.0) & (passed < LONGEST)
         # a drive without commands for some cycles moves to the next set point at its largest speed
         free &= (self._regular >= CATCHING_UP)[self.seen.group_of]
-        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # rates change more during a gap
+        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # in a gap between two samples, rates change more
         jumped = free & ~(jump <= allowed)
         if not jumped.any():
             return None
@@ -87,7 +87,7 @@ class EncoderJump(Fault):
         )
 
 
-class FollowingError(Fault):
+class _FollowingError(Fault):
     """Drum that is too far from its set point."""
 
     name = "following error"
@@ -111,7 +111,7 @@ class FollowingError(Fault):
         if largest(command.length - length) <= FOLLOWING:
             return None
         away = self._away(cycle)
-        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # another rule reports jumps
+        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # the rule _EncoderJump reports jumps
         if not far.any():
             return None
         winch = int(np.argmax(np.where(far, away, 0.0)))
@@ -121,9 +121,9 @@ class FollowingError(Fault):
         )
 
     def _away(self, cycle: Cycle) -> Array:
-        """Distance of each drum from the interval between the last two commands accepted by its PLC [m], (m,).
+        """Distance [m], (m,), of each length from the interval between the last two set points that its PLC accepted.
 
-        Drives that are not enabled are excluded, and so are groups whose commands are still in transit.
+        Drives that are not enabled, and groups whose commands are still in transit, are excluded.
         """
         sent = {command.counter: k for k, command in enumerate(self._sent)}
         length = cycle.sample.length
@@ -141,8 +141,8 @@ class FollowingError(Fault):
         return away
 
 
-class NotFollowing(Fault):
-    """Group that accepts no commands, or does not follow them."""
+class _NotFollowing(Fault):
+    """Group that accepts no commands, or accepts them but does not follow."""
 
     name = "group does not follow"
     rule = (
@@ -173,7 +173,7 @@ class NotFollowing(Fault):
             return None
         asked = {int(group) for group in self.seen.group_of[command.enable]}
         for g in sorted(asked):
-            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # without later commands
+            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # later commands do not count
             if missed > BEHIND:
                 return (
                     f"group {g} accepts no command for {missed} cycles; allowed: {BEHIND}. {CHECK}, then acknowledge."
@@ -197,7 +197,7 @@ class NotFollowing(Fault):
         return self._idle.get(group, 0)
 
 
-class ServoSaturated(Fault):
+class _ServoSaturated(Fault):
     """Drive at its force limit."""
 
     name = "servo at its limit"
@@ -221,8 +221,8 @@ class ServoSaturated(Fault):
         )
 
 
-class CorrectionAtLimit(Fault):
-    """Correction of a length by the tension loop. It is larger than the error of any good encoder."""
+class _CorrectionAtLimit(Fault):
+    """Length that the tension loop has corrected by more than the error of any good encoder."""
 
     name = "correction at its limit"
     rule = "the tension loop has changed a length by the allowed maximum, 5 mm by default"
@@ -239,3 +239,6 @@ class CorrectionAtLimit(Fault):
             f"the tension loop has changed length {winch} by {1e3 * cycle.correction[winch]:+.1f} mm; allowed: "
             f"{1e3 * self.seen.largest:g} mm. A length is not reliable: acknowledge, and home again."
         )
+
+
+DRIVE_FAULTS: Final = (_EncoderJump, _FollowingError, _NotFollowing, _ServoSaturated, _CorrectionAtLimit)

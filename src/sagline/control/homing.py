@@ -10,8 +10,8 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.control.link import Sample
-from sagline.control.null_space import SIGMAS, cell_sigma
-from sagline.control.set_points import SetPoint, Standing, winch_lengths
+from sagline.control.null_space import SIGMAS, cell_errors
+from sagline.control.set_points import Standing
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array
 from sagline.kinematics.forward import forward
@@ -27,18 +27,18 @@ from sagline.statics.stiffness import stiffness
 from sagline.tension.method import TensionMethod
 
 _SHARE: Final = 1e-3  # step of the numerical derivatives, in standard deviations
-_READING: Final = ("length_zero", "drum_radius")  # quantities that convert counts to lengths
+_READING: Final = ("length_zero", "drum_radius")  # quantities with which counts are converted to lengths
 
 
-def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Array:
+def _length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Array:
     """Allowed difference between lengths of a machine and lengths from homing, 5 sigma [m], shape (m,).
 
     A difference is due to errors of the load cells, the resolution of the encoders, and errors of the robot's data. The
-    errors of the robot's data are its tolerances, or the standard errors of its calibration where these are smaller.
-    Each error changes the computed length at the pose of `state`.
+    errors of the robot's data are its tolerances, or the standard errors of its calibration if these are smaller. Each
+    error changes the computed length at the pose of `state`.
     """
     winches = robot.winches
-    assert winches is not None  # a controller needs the drums
+    assert winches is not None  # a controller needs the data of the drums
     length, lever = state.unstrained_length, drum_lever(robot, state.unstrained_length)  # lever: [m/rad]
     variance = sum((part**2 for part in _at_pose(robot, state, model)), np.zeros(robot.cable_count))
     errors = _standard_errors(robot)
@@ -47,7 +47,7 @@ def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Arr
         variance += np.square(errors.get("drum_radius", 0.0) * (length - winches.length_zero) / lever)
     if winches.counts_per_turn is not None:
         count = 2.0 * np.pi * lever / np.abs(winches.gear * winches.counts_per_turn)
-        variance += count**2 / 12.0  # rounding error: uniform distribution over one count
+        variance += count**2 / 12.0  # the rounding error of a count is uniformly distributed over one count
     return np.asarray(SIGMAS * np.sqrt(variance))
 
 
@@ -59,22 +59,27 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
     stretch = 1.0 + winches.winding_tension / robot.cables.axial_stiffness
 
     def change(other: Robot, more: Array | float = 0.0) -> Array:
-        """Change of homed lengths per standard deviation, for the robot `other` and readings higher by `more` [N]."""
+        """Change of the lengths after homing if the robot is `other` and the readings are higher by `more` [N]."""
         there, here = (
             _zeros(home(some, state.pose, read, model=model).winches)
             for some, read in ((other, reading + more), (robot, reading))
         )
         return np.asarray((there - here) / (stretch * _SHARE))
 
-    yield change(robot, _SHARE * cell_sigma(robot))
+    yield change(robot, _SHARE * _cell_sigma(robot))
     for name, error in _standard_errors(robot).items():
-        if name in _READING or not UNCERTAIN[name].each:  # the load has no effect, because the tensions are known
+        if name in _READING or not UNCERTAIN[name].each:  # a load has no effect, because tensions are given
             continue
         if not np.isfinite(error).all():
             yield np.full(robot.cable_count, math.inf)
             continue
         for axis in np.eye(3) if UNCERTAIN[name].axes else np.ones(1):
             yield change(_varied(robot, name, _SHARE * error * axis))
+
+
+def _cell_sigma(robot: Robot) -> Array:
+    """Standard deviation of the load cell readings, including their bias [N], shape (m,)."""
+    return np.hypot(*cell_errors(robot))
 
 
 def _zeros(winches: Winch | None) -> Array:
@@ -85,7 +90,7 @@ def _zeros(winches: Winch | None) -> Array:
 
 
 def _standard_errors(robot: Robot) -> dict[str, Array]:
-    """Standard errors by name: tolerances of the robot, or errors of its calibration where these are smaller."""
+    """Standard errors by name: tolerances of the robot, or errors of its calibration if these are smaller."""
     errors = dict(robot.tolerances)
     for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
         errors[name] = np.minimum(error, errors.get(name, np.where(np.isfinite(error), error, 0.0)))
@@ -99,7 +104,7 @@ def _varied(robot: Robot, name: str, change: Array) -> Robot:
 
 
 def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> str:
-    """Describe the pose for the lengths `length` [m], (m,), and the distance of this pose from `stated`."""
+    """Text that names the pose for the lengths `length` [m], (m,), and the distance of this pose from `stated`."""
     found = forward(robot, length, start=stated, model=model)
     if not found.stable:
         return "at its lengths, the platform has no equilibrium near the stated pose"
@@ -110,17 +115,17 @@ def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> st
     return f"at its lengths, the platform is at ({x:.3f}, {y:.3f}, {z:.3f}) m, {away}"
 
 
-WINDOW: Final = 50  # number of samples at rest whose mean is compared
+WINDOW: Final = 50  # number of samples at rest whose mean is compared with the plan
 MOST: Final = 1.2  # a jog ends if a tension exceeds the planned tension times this factor
 
 
 class Homing:
-    """Plan at the stated pose, and comparison of tensions and lengths with the plan."""
+    """Plan at the pose that the operator stated, and comparison of tensions and lengths with this plan."""
 
     def __init__(
         self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod, zero: Array | float = 0.0
     ) -> None:
-        """Plan the stated pose `pose`; `zero`: offset from an earlier homing, added to lengths [m], (m,)."""
+        """Make the plan for the stated `pose`. `zero`: offset of lengths from an earlier homing [m], (m,)."""
         self.plan = inverse(robot, pose, model, method)  # plan of the robot at the stated pose
         if not self.plan.solved:
             gap = self.plan.gaps[0]
@@ -130,14 +135,14 @@ class Homing:
         self.state = self.plan.state
         self.standing = Standing.at(self.state)
         self.tension = self.state.cables.frame_end_tension  # planned T_A at the pose [N], shape (m,)
-        self.sigma = cell_sigma(robot)  # standard deviation of the load cells [N], shape (m,)
+        self.sigma = _cell_sigma(robot)  # standard deviation of the load cells [N], shape (m,)
         self._pose, self._robot, self._model = pose, robot, model
         m, winches = robot.cable_count, robot.winches
         self._present = zero + np.zeros(m)
         known = self._present.any() or (winches is not None and winches.length_zero is not None)
-        # tolerance: largest difference of a length that the operator need not confirm [m], shape (m,); infinite if the
-        # machine has no valid lengths
-        self.tolerance = length_tolerance(robot, self.state, model) if known else np.full(m, np.inf)
+        # tolerance: largest difference of a length without confirmation by the operator [m], shape (m,); infinite if
+        # the machine has no valid lengths
+        self.tolerance = _length_tolerance(robot, self.state, model) if known else np.full(m, np.inf)
         self._lengths, self._tensions = np.zeros(m), np.zeros(m)
         self._count, self._counter = 0, np.zeros(0, dtype=np.int64)
         # off: mean of the measured minus the planned tensions [N], shape (m,)
@@ -145,12 +150,12 @@ class Homing:
         # zero: offset added to the lengths of samples after homing [m], shape (m,)
         self.off, self.apart, self.zero = np.full(m, np.nan), np.full(m, np.nan), np.zeros(m)
         # agrees: True if every tension is within 5 sigma
-        # confirmed: True if the operator has confirmed the pose although lengths of the machine differ from the plan
+        # confirmed: True if the operator has confirmed the pose despite different lengths in the machine
         self.agrees = self.confirmed = False
 
     @property
     def conflicts(self) -> bool:
-        """True if the tensions agree, a length differs, and the operator has not yet confirmed the pose."""
+        """True if tensions agree but a length differs, and the operator has not yet confirmed the pose."""
         return self.agrees and not self._accepted
 
     @property
@@ -159,7 +164,7 @@ class Homing:
         return self.agrees and (known or bool((np.abs(self.apart) <= self.tolerance).all()))
 
     def moved(self) -> None:
-        """Discard samples and results after a winch has moved."""
+        """Discard samples and results, because a winch has moved."""
         self._rest()
         self.agrees = self.confirmed = False
 
@@ -169,9 +174,9 @@ class Homing:
         self._lengths[:] = self._tensions[:] = 0.0
 
     def look(self, sample: Sample) -> bool:
-        """Add a sample at rest; returns True if the samples are sufficient and agree with the plan."""
+        """Add a sample at rest. Returns True if there are enough samples and they agree with the plan."""
         if self._counter.size and bool((sample.counter == self._counter).any()):
-            return False  # a group has repeated its sample
+            return False  # a group has sent no new sample
         self._counter = sample.counter
         self._count += 1
         self._lengths += sample.length
@@ -184,6 +189,10 @@ class Homing:
         self.agrees = bool((np.abs(self.off) <= SIGMAS * self.sigma).all())
         self._rest()
         return self._accepted
+
+    def jog_limits(self, sample: Sample) -> Array:
+        """Upper tension limits of a jog [N], (m,): 1.2 times the planned tension, or the present tension if larger."""
+        return np.maximum(MOST * self.tension, sample.tension + 3.0 * self.sigma)
 
     def refusal(self) -> RefusedError:
         """Create the error that names the deviating lengths or tensions, and the next step."""
@@ -207,11 +216,11 @@ class Homing:
 
     @property
     def _place(self) -> str:
-        """Describe the pose of the platform that follows from the lengths of the machine."""
+        """Text with the pose that the platform would have if the lengths of the machine were right."""
         return place_of(self._robot, self.state.unstrained_length + self.apart, self._pose, self._model)
 
     def _conflict(self) -> RefusedError:
-        """Create the error for the length that differs most. It states the pose for the lengths of the machine."""
+        """Create the error for the length that differs most, with the pose that follows from the machine's lengths."""
         ratio = np.abs(self.apart) / self.tolerance
         i = int(np.argmax(np.where(np.isfinite(self.apart), ratio, np.inf)))
         there, planned = self.state.unstrained_length + self.apart, self.state.unstrained_length
@@ -231,30 +240,3 @@ class Homing:
         left = np.linalg.norm(off[:, None] + slope * by, axis=0)
         winch = int(np.argmin(left))
         return winch, float(np.clip(by[winch], -0.01, 0.01))
-
-
-class HomingJog:
-    """Set points for a jog of one winch, while the pose of the platform is unknown."""
-
-    def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
-        """Begin at the present lengths of the winches; `by`: change of the length of `winch` [m]; `period` [s]."""
-        self._lengths, self._rates = winch_lengths(point.length, winch, by, period)
-        self._row, self._point = 0, point
-        self._enable = np.zeros(len(point.length), dtype=np.bool_)
-        self._enable[winch] = True
-
-    def step(self) -> SetPoint:
-        """The set point at the end of the next cycle."""
-        last = len(self._lengths) - 1
-        self._row = min(self._row + 1, last)
-        return self._point._replace(
-            length=self._lengths[self._row],
-            rate=self._rates[self._row],
-            done=self._row == last,
-            enable=self._enable,
-        )
-
-
-def jog_tension_limits(homing: Homing, sample: Sample) -> Array:
-    """Tension limits of a jog [N], (m,): 1.2 times the planned tension, or the present tension if it is larger."""
-    return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

@@ -1,4 +1,4 @@
-"""Messages between controller and machine over any connection: one command and one sample in each cycle."""
+"""Messages between controller and machine, for any kind of connection: one command and one sample per cycle."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Whole: TypeAlias = NDArray[np.int64]
 PERIOD: Final = 0.01  # period of the controller's cycle [s]; the article uses 100 samples per second
 GROUP_SIZE: Final = 2  # number of winches per PLC
 COUNTERS: Final = 2**31 - 1  # largest counter of commands and blocks; counters start at 1 again after this value
-HEARTBEAT: Final = 0.1  # [s], a PLC stops its winches with a ramp if the command counter does not change for this time
-OWNER_TIMEOUT: Final = 0.5  # [s], another controller may become the owner if the counter does not change for this time
-CHECK: Final = "Check that its PLC or the twin runs and is connected"  # next step for a silent group
+HEARTBEAT: Final = 0.1  # [s], if the command counter does not change for this time, a PLC stops its winches with a ramp
+OWNER_TIMEOUT: Final = 0.5  # [s], if the counter does not change for this time, another controller may become the owner
+CHECK: Final = "Check that its PLC or the twin runs and is connected"  # next step after silence of a group
 RAMP: Final = 0.2  # duration of the ramp that reduces all rates to zero, in the controller and in a PLC [s]
 
 
@@ -38,7 +38,7 @@ class GroupStatus(IntFlag):
     BRAKED = 2
     FOLLOWING = 4  # the drives follow set points
     RAMPING = 8  # the group slows down without a command
-    HOLDING = 16  # the group holds without a command: after a ramp, or at a limit
+    HOLDING = 16  # the group holds without a command, after a ramp or at a limit
     LOCKED = 32  # drums are locked
     EMERGENCY = 64  # emergency stop of the hardware
 
@@ -47,11 +47,11 @@ class GroupFault(Status):
     """Reason why a PLC has stopped its winches; `text` describes it."""
 
     NONE = 0, "no fault"
-    HEARTBEAT = 1, "no command came for 100 ms"  # the counter did not change, or the last command expired
+    HEARTBEAT = 1, "no command came for 100 ms"  # the command counter did not change, or the last command expired
     OVER_TENSION = (
         2,
         "a tension was too large, or a load cell had no finite reading, while the cable was wound in",
-    )  # afterwards the winch can only pay out cable
+    )  # after this fault, the winch can only pay out cable
     FOLLOWING_ERROR = 3, "a drive was too far from its set points"
     SET_POINT = 4, "a set point or a tension of a command was out of range"
     EMERGENCY_STOP = 5, "the emergency stop is pressed"
@@ -59,7 +59,7 @@ class GroupFault(Status):
 
 
 def fault_text(code: int) -> str:
-    """Meaning of a fault code of a PLC, also of an unknown code."""
+    """Meaning of a fault code of a PLC. An unknown code also gets a text."""
     return GroupFault(code).text if code in set(GroupFault) else f"unknown code {code}"
 
 
@@ -100,14 +100,14 @@ class Command(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """Reason why a block, or a PLC, cannot be used."""
+    """Reason why a block or a PLC cannot be used."""
 
     reason: str
     next_step: str
 
 
 class Sample(NamedTuple):
-    """Newest data of the machine for G groups and m winches. The arrays belong to the caller.
+    """Newest data of a machine with G groups and m winches. The caller may change the arrays.
 
     Attributes:
         time: Time of the request, on the link's clock [s].
@@ -151,13 +151,13 @@ class Sample(NamedTuple):
     reasons: tuple[Refusal | None, ...] = ()
 
 
-# fields of a sample with one value per winch (the other fields: one per group), and fields with real numbers
+# fields of a sample with one value per winch (all others have one per group), and fields with real numbers
 OF_WINCHES: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault")
 REALS: Final = ("age", "plc_time", "length", "rate", "torque", "tension", "filtered")
 
 
 class Missing(NamedTuple):
-    """Answer of a link without a sample, because some groups have never answered.
+    """Answer of a link that has no sample, because some groups have never answered.
 
     Attributes:
         time: Time of the request, on the link's clock [s].
@@ -174,7 +174,7 @@ class Link(Protocol):
     """Connection to a machine.
 
     A sample is never older than the previous sample. Incomplete, foreign, repeated and out-of-order blocks are
-    discarded. The age of the group then increases.
+    discarded. The age of the group's data then increases.
     """
 
     @property
@@ -183,7 +183,7 @@ class Link(Protocol):
 
     @property
     def period(self) -> float:
-        """Time between two commands [s]; a set point is reached after this time."""
+        """Time between two commands [s]. A set point is reached after this time."""
 
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and return the newest sample, without waiting for an answer.
@@ -200,7 +200,7 @@ class Link(Protocol):
 
 
 class Sent(Enum):
-    """Message to one group in a cycle."""
+    """Kind of message to one group in a cycle."""
 
     COMMAND = "the command"
     CLAIM = "the claim of its owner"
@@ -220,7 +220,7 @@ def newer(counter: int, known: int) -> bool:
 
 
 def no_news(counter: int, known: int) -> Refusal:
-    """Reason to discard a block, because `counter` is not ahead of `known`, the newest counter."""
+    """Reason to discard a block whose `counter` is not ahead of `known`, the newest counter so far."""
     if counter == known:
         step = "Check that its PLC runs, and that a scan takes less than a cycle"
         return Refusal(f"its counter {counter} is repeated", step)

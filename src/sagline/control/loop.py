@@ -1,4 +1,4 @@
-"""The control loop: each cycle exchanges data, estimates the pose, checks for faults and prepares the next command."""
+"""The control loop. Each cycle exchanges data, estimates the pose, checks for faults and prepares the next command."""
 
 from __future__ import annotations
 
@@ -34,10 +34,6 @@ class Loop:
         except BaseException as error:
             self._break_off(error)
             raise
-
-    def request_stop(self) -> None:
-        """Begin to stop the motion in the next cycle."""
-        self.stop_requested = True
 
     def _cycle(self) -> None:
         c, point = self.context, self.active.point
@@ -97,7 +93,7 @@ class Loop:
         return found[0] if found else ""
 
     def _break_off(self, error: BaseException) -> None:
-        """Command the PLCs to reduce the rates to zero themselves, because there may be no next cycle."""
+        """Command the PLCs to reduce the rates to zero by themselves, because perhaps no further cycle follows."""
         c = self.context
         c.garbage.go_on()
         line = f"a cycle ended with {type(error).__name__}: {' '.join(str(error).split())[:160]}. The drives hold."
@@ -115,12 +111,12 @@ class Loop:
                     c.enter(State.STOPPING, line)
                 self.active = Holding(c, State.FAULT, line)
             self.active.rest(Mode.HOLD, enabled=True)
-        with suppress(Exception):  # the exception may come from the link itself
+        with suppress(Exception):  # the link itself may have raised the exception
             c.link.exchange(c.sender.command)
 
 
 def _aged(known: Sample | None, missing: Missing) -> Sample | None:
-    """Previous sample `known` with increased age, for a cycle without a new sample; None if `known` is None."""
+    """The previous sample `known` with increased age, for a cycle without a new sample. None if `known` is None."""
     if known is None:
         return None
     return known._replace(time=missing.time, age=known.age + (missing.time - known.time))

@@ -1,4 +1,4 @@
-"""Null space of the structure matrix, parity of the load cells, and the tension loop, which acts in the null space."""
+"""Null space of the structure matrix, the tension loop that acts in it, and parity of the load cells."""
 
 from __future__ import annotations
 
@@ -46,12 +46,7 @@ SIGMAS: Final = 5.0  # tolerance of a reading, in standard deviations
 OWN_DEVIATION: Final = 1.0  # deviation of a load cell without data [N]
 BIAS: Final = 2.0  # bias of a load cell without data [N], 0.1 % of 2 kN
 _LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-_HIDDEN: Final = 1e-6  # an error counts as not visible if its visible part is below this share
-
-
-def cell_sigma(robot: Robot) -> Array:
-    """Standard deviation of the load cell readings, bias included [N], shape (m,)."""
-    return np.hypot(*cell_errors(robot))
+_HIDDEN: Final = 1e-6  # an error is not visible if its visible part is below this share of it
 
 
 def cell_errors(robot: Robot) -> tuple[Array, Array]:
@@ -61,22 +56,22 @@ def cell_errors(robot: Robot) -> tuple[Array, Array]:
     return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
 
 
-def balance_slope(state: Equilibrium) -> Array:
-    """Derivatives of the wrench with respect to frame-end tensions, at a fixed platform, (..., n, m) [1, m]."""
+def _balance_slope(state: Equilibrium) -> Array:
+    """Derivatives of the wrench with respect to frame-end tensions if the platform is fixed, (..., n, m) [1, m]."""
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes)[1][..., None, :]
-    found: Array = -first_of(state.robot).freedom @ wrench  # minus, because these are forces on the cable
+    found: Array = -first_of(state.robot).freedom @ wrench  # minus: these forces act on the cable
     return found
 
 
 @of_equilibrium
 def parity(state: Equilibrium) -> Array:
-    """Parity matrix for the detection of load cell faults. It does not depend on the weight of the load.
+    """Parity matrix for the detection of load cell faults. The weight of the load has no effect on it.
 
     At rest, the measured tensions must give the planned wrench. Only the vertical force may differ, because the weight
-    of the load may be unknown. V is the projection of tension errors onto all other changes of the wrench. Row i of the
-    matrix is V_i/sqrt(V_ii). The product of row i and the tension errors (measured minus planned) is the visible part
-    of the best-fitting error of cell i. The cell with the largest product is reported.
+    of the load may be unknown. V projects tension errors onto all other changes of the wrench. Row i of the matrix is
+    V_i/sqrt(V_ii). The product of row i and the tension errors (measured minus planned) is the visible part of the
+    error of cell i that fits best. The cell with the largest product is reported.
 
     Args:
         state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
@@ -98,7 +93,7 @@ def parity(state: Equilibrium) -> Array:
     Source:
         docs/model.md, section 12.
     """
-    slope = balance_slope(state)
+    slope = _balance_slope(state)
     lost = np.isnan(slope).any(axis=(-1, -2), keepdims=True)
     slope = np.where(lost, 0.0, slope)
     inverse = np.linalg.pinv(slope)
@@ -115,10 +110,10 @@ class NullSpace(NamedTuple):
     """Null-space and parity matrices at a pose; N_L is `null_lengths`, and K_A is `tension_sensitivity`.
 
     Attributes:
-        projection: Pi = N_L N_L^T, projection of changes of length onto changes that do not move the platform, shape
+        projection: Pi = N_L N_L^T, which projects changes of length onto changes that do not move the platform, shape
             (..., m, m).
-        visible: K_A N_L G with G = (K_A N_L)^+, projection of tension errors onto errors that changes of length in N_L
-            can correct, shape (..., m, m).
+        visible: K_A N_L G with G = (K_A N_L)^+, which projects tension errors onto the errors that changes of length in
+            N_L can correct, shape (..., m, m).
         correction: N_L G, changes of length that correct these tension errors, shape (..., m, m) [m/N].
         parity: Parity matrix of the load cells, shape (..., m, m): see `parity`.
     """
@@ -131,10 +126,11 @@ class NullSpace(NamedTuple):
 
 @of_equilibrium
 def null_space(state: Equilibrium) -> NullSpace:
-    """Changes of length that do not move the platform (to first order), and their effect on the tensions.
+    """Changes of length that do not move the platform, to first order, and the effect of these changes on the tensions.
 
-    With eight cables, a tension error has eight components. Six of them correspond to an unplanned wrench, for example
-    due to a payload. Their correction would move the platform and is therefore excluded.
+    With eight cables, a tension error has eight components. Six of the components correspond to an unplanned wrench,
+    for example due to a payload. A correction of an unplanned wrench would move the platform, and is therefore
+    excluded.
 
     Args:
         state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments (robot,
@@ -173,16 +169,16 @@ class Gains:
     """Matrices of the tension loop at R poses of a plan.
 
     Attributes:
-        time: Times of the R poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
+        time: Times of the R poses [s], strictly increasing, shape (R,). The time is 0 for a plan of a single pose.
         rows: Matrices at these poses.
     """
 
     time: Array
     rows: tuple[NullSpace, ...]
-    _changes: tuple[float, ...]  # R - 1 mean values of consecutive times
+    _changes: tuple[float, ...]  # mean values of consecutive times, (R - 1,)
 
     def at(self, time: float) -> NullSpace:
-        """Matrices of the pose whose time is nearest.
+        """Matrices of the pose whose time is nearest to `time`.
 
         Args:
             time: Time since the start of the path [s].
@@ -198,8 +194,8 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
         every: Time between two rows [s], > 0; each row is at the nearest sample of the plan.
 
     Returns:
-        The table. None for a robot without redundancy: it has no tension loop, because the load determines the
-        tensions.
+        The table. None for a robot without redundancy. The tensions of such a robot depend only on the load, so that it
+        has no tension loop.
 
     Raises:
         InvalidValueError: If `plan` has several poses but no path, or has a pose without lengths.
@@ -239,7 +235,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
 
 
 def _nearest(time: Array, step: float) -> np.ndarray:
-    """Indices of the last sample, and of the samples of `time` that are nearest to times with the spacing `step`."""
+    """Indices of samples of `time`: the nearest to multiples of `step`, and the last one."""
     wanted = time[0] + step * np.arange(int((time[-1] - time[0]) / step) + 1)
     after = np.clip(np.searchsorted(time, wanted), 1, max(time.size - 1, 1))
     if time.size == 1:
@@ -254,15 +250,15 @@ MOST_GAIN: Final = 0.1  # largest gain per cycle; a loop with a delay of five cy
 
 @dataclass(frozen=True, slots=True)
 class TensionSettings(NumberFields):
-    """Settings of the tension loop. The defaults give stability margins of 24 dB and 62° for a delay of 5 cycles.
+    """Settings of the tension loop. At a delay of 5 cycles, the defaults give stability margins of 24 dB and 62°.
 
     Attributes:
         filter_time: Time constant of the input filter [s], > 0.
-        gain: Share of the error that is corrected in each cycle, >= 0, at most 0.1; 0 switches the loop off.
+        gain: Share of the error that is corrected in each cycle, 0 to 0.1. The value 0 switches the loop off.
         act_above: The loop begins to act if the largest tension error in the null space exceeds this value [N].
         rest_below: The loop stops acting if the largest tension error is below this value [N], >= 0, less than
             `act_above`.
-        largest: Limit of the correction of a length [m], > 0.
+        largest: Largest correction of a length [m], > 0.
 
     Raises:
         InvalidValueError: If a value is out of its range.
@@ -288,8 +284,8 @@ class TensionSettings(NumberFields):
 class TensionLoop:
     """Correction of lengths that reduces the tension errors.
 
-    The correction is kept for a session, because the errors of the lengths remain. In each cycle, f <- f + h/(tau + h)
-    (T - T_plan - f). While the loop acts, delta <- delta - k N_L G f. See docs/model.md, section 12.
+    The correction is kept for the whole session, because the errors of the lengths are constant. In each cycle, f <- f
+    + h/(tau + h) (T - T_plan - f). While the loop acts, delta <- delta - k N_L G f. See docs/model.md, section 12.
 
     Attributes:
         settings: Gain, filter and limits.
@@ -333,13 +329,13 @@ class TensionLoop:
             tension: T_A, tension measured by the load cells [N], shape (m,).
             planned: Planned tension at the same time [N], shape (m,).
             row: Matrices of the tension loop at this time of the plan.
-            frozen: True if the tensions are old or doubtful. Tensions then have no effect, and the correction is
-                adapted only to the pose.
+            frozen: True if the tensions are old or doubtful. Such tensions have no effect; the correction is only
+                adapted to the pose.
 
         Returns:
             Correction of the lengths of the plan [m], shape (m,), an array owned by the caller.
         """
-        if row is not self._row:  # a correction in the null space of one pose would move the platform at the next pose
+        if row is not self._row:  # a correction from another pose's null space would move the platform
             if self._row is not None:
                 np.matmul(row.projection, self._correction, out=self._change)
                 self._correction[:] = self._change
@@ -363,4 +359,4 @@ class TensionLoop:
         change *= settings.gain
         self._correction -= change
         if (most := largest(self._correction)) > settings.largest:  # a fault rule reports a correction at its limit
-            self._correction *= settings.largest / most  # a separate limit for each length would move the platform
+            self._correction *= settings.largest / most  # separate limits would move the platform

@@ -1,4 +1,4 @@
-"""View of a controller, and requests to connect, home, stop, acknowledge faults and switch off."""
+"""State of a controller as properties, and requests to connect, home, stop, acknowledge faults and switch off."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final, TypeVar
 
-from sagline.control.active_states import Connecting, Holding, HomingState, Off, idle_at
+from sagline.control.active_states import Connecting, Following, Holding, HomingState, Off
 from sagline.control.context import Context
 from sagline.control.execution import Execution
 from sagline.control.homing import Homing
@@ -49,7 +49,7 @@ class Preparation:
 
     @property
     def sample(self) -> Sample | None:
-        """Newest sample of the machine; None before the first."""
+        """Newest sample of the machine; None before the first sample."""
         return self._context.sample
 
     @property
@@ -69,7 +69,7 @@ class Preparation:
 
     @property
     def degraded(self) -> bool:
-        """True if tensions are not reliable. The tension loop then keeps its correction."""
+        """True if tensions are not reliable, so that the tension loop keeps its correction."""
         return self._context.degraded
 
     @property
@@ -78,10 +78,10 @@ class Preparation:
         return tuple(self._context.journal.events)
 
     def events_from(self, first: int) -> list[Event]:
-        """Events that are newer than the known events.
+        """Events after the first `first` events.
 
         Args:
-            first: Number of events that are already known.
+            first: Number of events that the caller already knows.
 
         Raises:
             InvalidValueError: If `first` is not a whole number between 0 and the number of events.
@@ -127,8 +127,8 @@ class Preparation:
     def cycle(self) -> None:
         """Run one cycle: exchange data, estimate the pose, check for faults, and prepare the next command.
 
-        An exception in the cycle stops the winches. It becomes an event, a hold command is sent, and the exception is
-        raised again.
+        An exception in the cycle stops the winches. The exception becomes an event, a hold command is sent, and the
+        exception is raised again.
         """
         self._loop.cycle()
 
@@ -136,7 +136,7 @@ class Preparation:
         """Begin to connect.
 
         Raises:
-            RefusedError: If the controller is already connected, or is read-only.
+            RefusedError: If the controller is already connected. If it only reads.
         """
         if self._context.shadow:
             raise RefusedError("connecting", "this controller only reads", "Make a controller with shadow=False.")
@@ -147,7 +147,7 @@ class Preparation:
         """Connect, and wait until all groups agree.
 
         Raises:
-            RefusedError: If the groups do not agree; the message contains the reason.
+            RefusedError: If the groups do not agree: the message contains the reason.
         """
         self.claim()
         connecting = self._loop.active
@@ -164,7 +164,7 @@ class Preparation:
             pose: A single pose.
 
         Raises:
-            RefusedError: If the robot is not ready, or the pose has no tensions within the limits.
+            RefusedError: If the robot is not ready. If no tensions within the limits exist at `pose`.
         """
         c, active = self._context, self._loop.active
         if not isinstance(active, HomingState):
@@ -185,24 +185,24 @@ class Preparation:
     def home(self, pose: PoseLike) -> None:
         """State the pose of the platform at rest, and wait until tensions and lengths agree.
 
-        Lengths are compared if the robot has `length_zero`, or if the controller was homed before.
+        Lengths are compared only if the robot has `length_zero` or the controller was homed before.
 
         Args:
             pose: A single pose.
 
         Raises:
-            RefusedError: If the tensions do not agree; the message then recommends a jog. If only the lengths of the
-                machine do not agree. In both cases, the state remains HOMING, and no length changes.
+            RefusedError: If the tensions do not agree: the message recommends a jog. If only the lengths of the machine
+                do not agree. In both cases, the state remains HOMING, and no length changes.
         """
         self.begin_homing(pose)
         self._compare()
 
     def confirm_homing(self) -> None:
-        """Confirm the pose of `home` although lengths of the machine differ, and wait until the tensions agree again.
+        """Confirm the pose of `home` despite different lengths in the machine, and wait until the tensions agree again.
 
         Raises:
-            RefusedError: If the last call of `home` did not report a difference of lengths, a winch has moved after it,
-                or the tensions do not agree.
+            RefusedError: If the last call of `home` did not report a difference of lengths. If a winch has moved since
+                `home`. If the tensions do not agree.
         """
         active = self._loop.active
         if not isinstance(active, HomingState) or not active.homing.conflicts:
@@ -212,7 +212,7 @@ class Preparation:
         self._compare()
 
     def _compare(self) -> None:
-        """Wait until homing ends; raise an error if it does not succeed."""
+        """Wait until homing ends. Raise an error if homing fails."""
         last = self._context.number + round(SETTLING / self.period)
 
         def waits() -> bool:
@@ -228,8 +228,8 @@ class Preparation:
             raise RefusedError("homing", reason, "Read the events.")
 
     def stop(self) -> None:
-        """Stop: if the robot moves, reduce all rates to zero from the next cycle on."""
-        self._loop.request_stop()
+        """Stop the robot: if it moves, all rates decrease to zero from the next cycle on."""
+        self._loop.stop_requested = True
 
     def acknowledge(self) -> None:
         """Confirm that a fault is repaired. The state changes from FAULT to READY, and to IDLE if the pose is known.
@@ -237,7 +237,7 @@ class Preparation:
         If load cells are ignored while the robot is idle, they are used again.
 
         Raises:
-            RefusedError: In any other state, or if a group does not agree yet; the message contains the reason.
+            RefusedError: If there is no fault. If a group does not agree yet: the message contains the reason.
         """
         c, what = self._context, "acknowledging"
         if self.state is State.IDLE and self.degraded:
@@ -251,10 +251,10 @@ class Preparation:
         self._loop.active = Holding(c, State.READY, "the operator acknowledged")
         if c.homed:
             found = c.find_equilibrium(sample.length + c.zero - c.correction)
-            self._loop.active = idle_at(c, found, "the pose is still known") or self._loop.active
+            self._loop.active = Following.at_rest(c, found, "the pose is still known") or self._loop.active
 
     def off(self) -> None:
-        """Give up the ownership of all groups, and wait until this is done. The brakes then engage.
+        """Give up the ownership of all groups, and wait until no group is owned. The brakes then engage.
 
         Raises:
             RefusedError: If the robot moves.
@@ -281,7 +281,7 @@ class Preparation:
             self._context.garbage.go_on()
 
     def _result_of(self, work: Callable[[], T]) -> T:
-        """Do long work. In real time, cycles continue meanwhile, because otherwise the PLCs would hold."""
+        """Result of long `work`. In real time, cycles continue meanwhile, because otherwise the PLCs would hold."""
         if self._context.pace is None or self.state is State.OFF:
             return work()
         result = result_in_thread(work)

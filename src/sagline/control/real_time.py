@@ -1,8 +1,7 @@
-"""Real time: ticks, garbage collection, Ctrl-C, and early loading of kernels."""
+"""Control in real time: ticks, garbage collection, Ctrl-C, and early loading of kernels."""
 
 from __future__ import annotations
 
-import gc
 import os
 import signal
 import threading
@@ -31,7 +30,7 @@ from sagline.tension.method import TensionMethod
 
 T = TypeVar("T")
 BIN: Final = 1e-4  # width of a bin [s]
-BINS: Final = 1000  # number of bins; one more bin counts all longer durations
+BINS: Final = 1000  # number of bins; an additional bin counts all longer durations
 
 
 class Histogram:
@@ -78,7 +77,7 @@ class Pace:
     """Clock without drift: `wait` returns at the next tick. The duration of a cycle has no effect on the ticks.
 
     The thread sleeps during the wait, because threads of the link need the processor. If a cycle is late by more than a
-    period, the ticks restart at the late cycle. Missed set points are then not sent all at once.
+    period, the ticks restart at the late cycle. Without this restart, all missed set points would be sent at once.
     """
 
     def __init__(self, period: float = PERIOD) -> None:
@@ -123,7 +122,7 @@ def set_priority(priority: int) -> None:
         priority: 1 to 99; the kernel's own threads have 50.
 
     Raises:
-        InvalidValueError: If the priority is out of range, the permission is missing, or this system has no such
+        InvalidValueError: If `priority` is out of range. If the permission is missing. If this system has no such
             scheduler.
     """
     level = whole_number(priority, "priority", 1, 99)
@@ -137,29 +136,9 @@ def set_priority(priority: int) -> None:
         raise InvalidValueError("priority", level, allowed, step) from None
 
 
-class Garbage:
-    """Switch for the garbage collection, which is off during motion, because it can take longer than a cycle."""
-
-    def __init__(self) -> None:
-        """Create the switch; nothing changes yet."""
-        self._stopped = False
-
-    def stop(self) -> None:
-        """Switch collection off."""
-        if not self._stopped and gc.isenabled():
-            self._stopped = True
-            gc.disable()
-
-    def go_on(self) -> None:
-        """Switch collection on again, if it was on before."""
-        if self._stopped:
-            self._stopped = False
-            gc.enable()
-
-
 @contextmanager
 def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
-    """Context of the main thread. The first Ctrl-C calls `stop`, and KeyboardInterrupt is raised at the end."""
+    """Block of the main thread in which the first Ctrl-C calls `stop`; KeyboardInterrupt follows at the block's end."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
@@ -182,15 +161,15 @@ def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
 
 
 def result_in_thread(work: Callable[[], T]) -> Future[T]:
-    """Run work in another thread of ordinary priority. Canceling the returned future does not stop the work.
+    """Run `work` in another thread of ordinary priority. Canceling the returned future does not stop the work.
 
-    Cycles continue during the work, because compiled kernels release Python's lock. A process in place of the thread
-    would make cycles late when it returns a long plan.
+    Cycles continue during the work, because compiled kernels release Python's lock. A process instead of the thread
+    would make cycles late at the moment when it returns a long plan.
     """
     result: Future[T] = Future()
 
     def run() -> None:
-        with suppress(AttributeError, OSError):  # the loop may have a priority in real time
+        with suppress(AttributeError, OSError):  # the control loop may have a real-time priority
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         try:
             value = work()
@@ -211,7 +190,7 @@ HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # depths of the poses below the frame anchors,
 
 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
-    """Load the kernels by a homing, a path and jogs near the middle of `robot`. Refused requests are ignored."""
+    """Load all kernels of a controller: run a homing, a path and jogs near the middle of `robot`. Ignore refusals."""
     middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)
@@ -230,7 +209,7 @@ def load_kernels(robot: Robot, period: float, model: CableModel, method: Tension
 
 
 def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
-    """First position with feasible tensions, and its plan. If no position is feasible: the middle, and None."""
+    """First position with feasible tensions, and its plan. If no position is feasible, the middle and None."""
     for place in _probable_positions(robot):
         pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
         with suppress(SaglineError):
@@ -248,7 +227,7 @@ def _straight_set_point(robot: Robot, pose: Pose) -> SetPoint:
 
 
 def _probable_positions(robot: Robot) -> list[Array]:
-    """Positions to try: middle of the test box, and points below the middle of the frame anchors."""
+    """Positions that are probably feasible: middle of the test box, and points below the middle of the anchors."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     width = float(np.linalg.norm((high - low)[:2]))
     below = [np.asarray(0.5 * (low + high) - [0.0, 0.0, height * width]) for height in HEIGHTS]

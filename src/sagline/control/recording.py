@@ -24,7 +24,7 @@ class EventKind(StrEnum):
 
     STATE = "state"  # change of state
     FAULT = "fault"
-    NOTE = "note"  # note for the operator; no effect on the controller
+    NOTE = "note"  # note for the operator, without effect on the controller
 
 
 class Event(NamedTuple):
@@ -53,7 +53,7 @@ class Recorded(NamedTuple):
     Attributes:
         number: Index of the cycle, from 0.
         state: State of the controller at the end of the cycle.
-        degraded: True if a load cell is ignored. The tension loop then keeps its correction.
+        degraded: True if a load cell is ignored, so that the tension loop keeps its correction.
         late: Delay of the start of the cycle [s]; 0 on a lockstep clock.
         clock: Time since the start of the plan [s]; NaN without a plan.
         command: Command sent in the cycle; None if nothing was sent.
@@ -61,9 +61,9 @@ class Recorded(NamedTuple):
         position: Position of the platform's origin, from the encoders [m], shape (3,); NaN before homing.
         quaternion: Rotation platform -> world from the encoders, scalar last, shape (4,).
         estimate: Code of the `ForwardStatus`; -1 without an estimate.
-        zero: Offset from homing, added to lengths of samples and subtracted from set points [m], shape (m,).
+        zero: Offset from homing [m], shape (m,). Added to the lengths of samples, subtracted from set points.
         planned_tension: Planned T_A at the time of the answer [N], shape (m,); NaN without a plan.
-        correction: Correction by the tension loop, included in the set points that were sent [m], shape (m,).
+        correction: Correction by the tension loop [m], shape (m,). The set points that were sent include it.
     """
 
     number: int
@@ -83,11 +83,11 @@ class Recorded(NamedTuple):
 
 @runtime_checkable
 class Recorder(Protocol):
-    """Receiver of cycles and events, for example a log. Its methods must return at once: the control loop waits."""
+    """Receiver of cycles and events, for example a log. The methods must be fast, because the control loop waits."""
 
     @property
     def stopped(self) -> str:
-        """Reason why the recorder has stopped, "" while it runs; the fault rules check it."""
+        """Reason why the recorder has stopped, "" while it runs. A fault rule checks the reason."""
 
     def begins(self, plan: Plan) -> None:
         """Receive a plan before its first cycle.
@@ -164,7 +164,7 @@ class CycleTable:
 
     @property
     def rows(self) -> NDArray[Any]:
-        """Cycles so far, (N,), not copied. Fields: those of `Execution`, and `sample` with the fields of `Samples`."""
+        """Cycles so far, (N,), not copied: the fields of `Execution`, and `sample` with the fields of `Samples`."""
         return self._rows[: self._count]
 
 
@@ -173,7 +173,7 @@ class Journal:
 
     def __init__(self, record: Recorder | None) -> None:
         """Begin without events."""
-        given: object = record  # this check is for callers without a type checker
+        given: object = record  # this check helps callers without a type checker
         if given is not None and not isinstance(given, Recorder):
             step = "Give an object with the methods of control.Recorder, or None."
             raise InvalidValueError("record", brief(given), "a receiver of cycles and events", step)
@@ -186,12 +186,12 @@ class Journal:
         return self._record is not None
 
     def add(self, event: Event) -> str:
-        """Add an event; return the message of `tell`."""
+        """Add an event. Returns the message of `tell`."""
         self.events.append(event)
         return self.tell(lambda record: record.event(event))
 
     def tell(self, what: Callable[[Recorder], object]) -> str:
-        """Call a method of the recorder. Return "". After an exception, remove the recorder and return a message."""
+        """Call a method of the recorder. Returns "", or a message after an exception, which removes the recorder."""
         if self._record is None:
             return ""
         try:

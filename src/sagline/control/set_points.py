@@ -6,16 +6,13 @@ from math import ceil
 from typing import Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion, check_lead
 from sagline.control.link import RAMP
 from sagline.control.null_space import NullSpace, null_space
 from sagline.control.states import RefusedError
-from sagline.core.arguments import whole_number
-from sagline.core.arrays import Array, Flags, checked, number
-from sagline.core.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.status import STABLE, ForwardStatus, PoseStatus
@@ -25,8 +22,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-LEAD_SPEED: Final = 0.01  # [m/s], largest rate of the transition from lengths at rest to the lengths of a plan
-WHOLE: Final = 1e-9  # tolerance of the time, in rows
+LEAD_SPEED: Final = 0.01  # [m/s], largest rate in the transition from the lengths at rest to the lengths of a plan
+WHOLE: Final = 1e-9  # tolerance of the time on the path, in rows
 
 
 class SetPoint(NamedTuple):
@@ -39,8 +36,8 @@ class SetPoint(NamedTuple):
     wrench: Array | None  # external plus inertial wrench on the platform [N, N m], shape (6,); None for zero
     row: NullSpace | None  # matrices of the tension loop at the set point; None without matrices
     clock: float  # time since the start of the plan [s]; NaN outside a plan
-    done: bool  # True if the source ends here
-    enable: Flags | None = None  # drives that may move, shape (m,); None for all
+    done: bool  # True for the last set point of a source
+    enable: Flags | None = None  # drives that may move, shape (m,); None for all drives
     # True during the transition from the lengths at rest to the lengths of a plan. The tensions then differ from the
     # planned tensions.
     leading: bool = False
@@ -76,12 +73,12 @@ class Standing:
 
 
 def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
-    """Constant set point for `length` [m], (m,), and its pose. If no pose is found: the status of the search."""
+    """Constant set point for `length` [m], (m,), with its pose. If no pose is found, the status of the search."""
     found = forward(robot, length, start, model)
     return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
 
 
-class Fade:
+class _Fade:
     """Smooth transition from the lengths at rest to the lengths of a plan."""
 
     def __init__(self, lead: Array, period: float) -> None:
@@ -96,26 +93,26 @@ class Fade:
         return self._cycle >= self._cycles
 
     def step(self) -> tuple[Array, Array] | None:
-        """Remaining difference at the end of the next cycle [m], and its rate [m/s], both (m,); None if it is zero."""
+        """Remaining difference [m] at the end of the next cycle, and its rate [m/s], (m,) each; None if it is zero."""
         self._cycle += 1
         if self.done:
             return None
         share = self._cycle / self._cycles
-        fall = smooth_slope(share) / (self._cycles * self._period)
+        fall = _smooth_slope(share) / (self._cycles * self._period)
         return (1.0 - smooth(share)) * self._lead, -fall * self._lead
 
 
 class Along:
-    """Set points along a motion, on a clock that can slow down and continue."""
+    """Set points along a motion, on a clock that can slow down, stop and continue."""
 
     def __init__(self, motion: Motion, period: float, lead: Array) -> None:
-        """Begin at the first row. The offset `lead` [m], (m,), decreases to zero. `period` is in s."""
+        """Begin at the first row of `motion`. The offset `lead` [m], (m,), decreases to zero; `period` [s]."""
         self.motion = motion
         self._period, self._last = period, len(motion) - 1
         self._row = 0.0
         self._speed = self._wanted = 1.0
         self._change = period / RAMP
-        self._fade = Fade(lead, period)
+        self._fade = _Fade(lead, period)
 
     @property
     def clock(self) -> float:
@@ -179,7 +176,7 @@ class Along:
 
 
 class Ramp:
-    """Ramp that reduces all rates to zero in the same time: l' = l'_0 (1 - t/t_s). The direction is preserved."""
+    """Ramp l' = l'_0 (1 - t/t_s) that reduces all rates to zero in the same time; their ratios are constant."""
 
     def __init__(self, point: SetPoint, period: float) -> None:
         """Begin at `point`, the last set point; `period` [s]."""
@@ -201,11 +198,11 @@ _Real = TypeVar("_Real", float, Array)
 
 
 def smooth(share: _Real) -> _Real:
-    """Cubic from 0 to 1. Its slope is zero at both ends and at most 1.5."""
+    """Cubic function from 0 to 1, with a slope of zero at both ends and of at most 1.5 between them."""
     return share * share * (3.0 - 2.0 * share)
 
 
-def smooth_slope(share: _Real) -> _Real:
+def _smooth_slope(share: _Real) -> _Real:
     """Derivative of `smooth`."""
     return 6.0 * share * (1.0 - share)
 
@@ -214,31 +211,42 @@ WINCH_SPEED: Final = 0.01  # speed of a winch jog [m/s]
 PLATFORM_SPEED: Final = 0.02  # speed of a platform jog [m/s]
 PLATFORM_TURNING: Final = 0.05  # angular speed of a platform jog [rad/s]
 SHORTEST: Final = 0.4  # shortest duration of a jog [s]
-MOST_WINCH: Final = 0.1  # largest jog of a winch [m]
-MOST_PLATFORM: Final = 0.2  # largest jog of the platform [m or rad]
 
 
-def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
-    """Check the index `winch`, and the change `by` of its length [m]. Paid-out cable is positive."""
-    chosen = whole_number(winch, "winch", 0, robot.cable_count - 1)
-    return chosen, _at_most(number(by, "by", "m"), "m", MOST_WINCH)
-
-
-def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
-    """Lengths and rates (N, m) of a jog from `length` [m]; `winch` changes by `by` [m]. One row per `period` [s]."""
+def _winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
+    """Lengths and rates (N, m) of a jog from `length` [m], one row per `period` [s]. `by`: change of `winch` [m]."""
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
     lengths, rates = np.repeat(length[None], count + 1, axis=0), np.zeros((count + 1, len(length)))
     lengths[:, winch] += by * smooth(share)
-    rates[:, winch] = by * smooth_slope(share) / (count * period)
+    rates[:, winch] = by * _smooth_slope(share) / (count * period)
     return lengths, rates
+
+
+class HomingJog:
+    """Set points for a jog of one winch, while the pose of the platform is unknown."""
+
+    def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
+        """Begin at the present lengths of the winches. `by`: change of the length of `winch` [m]; `period` [s]."""
+        self._lengths, self._rates = _winch_lengths(point.length, winch, by, period)
+        self._row, self._point = 0, point
+        self._enable = np.zeros(len(point.length), dtype=np.bool_)
+        self._enable[winch] = True
+
+    def step(self) -> SetPoint:
+        """The set point at the end of the next cycle."""
+        last = len(self._lengths) - 1
+        self._row = min(self._row + 1, last)
+        return self._point._replace(
+            length=self._lengths[self._row], rate=self._rates[self._row], done=self._row == last, enable=self._enable
+        )
 
 
 def winch_jog(
     robot: Robot, length: Array, here: Pose, winch: int, by: float, period: float, model: CableModel
 ) -> Motion:
-    """Plan and check a jog of `winch` by `by` [m], from `length` at rest [m], (m,). The jog moves the platform."""
-    lengths, rates = winch_lengths(length, winch, by, period)
+    """Plan and check a jog of `winch` by `by` [m], from `length` [m], (m,), at rest. The platform moves along."""
+    lengths, rates = _winch_lengths(length, winch, by, period)
     found = forward(robot, lengths, here, model)
     what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or jog another winch."
     if not found.solved.all():
@@ -281,7 +289,7 @@ class PlatformJog:
         model: CableModel,
         method: TensionMethod,
     ) -> None:
-        """Prepare the solver and check the last pose; `by`: displacement, rotation [m, rad], (6,); `period` [s]."""
+        """Prepare the solver, and check the last pose. `by`: displacement and rotation [m, rad], (6,); `period` [s]."""
         self._robot, self._pose, self._by, self._period = robot, pose, by, period
         self._solver = InverseSolver(robot, model, method)
         move, turn = float(np.linalg.norm(by[:3])), float(np.linalg.norm(by[3:]))
@@ -298,10 +306,10 @@ class PlatformJog:
         first = self._solver.step(*self._at(0.0))
         lead = begin.length - first.unstrained_length
         check_lead("the jog", lead)
-        self._fade = Fade(lead, period)
+        self._fade = _Fade(lead, period)
 
     def step(self) -> SetPoint:
-        """Set point of the next cycle. If its pose has no solution: the last set point; `failed` is then the reason."""
+        """Set point of the next cycle, or the last set point if the next pose has no solution; see `failed`."""
         self._cycle = min(self._cycle + 1, self._count)
         share = self._cycle / self._count
         found = self._solver.step(*self._at(smooth(share)))
@@ -341,22 +349,3 @@ class PlatformJog:
             ]
         )
         return self._pose.position + by[:3], turned / np.linalg.norm(turned)
-
-
-def checked_displacement(by: ArrayLike) -> Array:
-    """Check `by`: a displacement, with or without a rotation vector. Return both, (6,); a missing rotation is zero."""
-    given = checked(by, "by", "m or rad")
-    if given.shape not in ((3,), (6,)):
-        step = "Give a displacement, or a displacement and a rotation vector."
-        raise InvalidValueError("by", f"of shape {given.shape}", "shape (3,) or (6,)", step)
-    whole = np.zeros(6)
-    whole[: given.size] = given
-    for part, unit in ((whole[:3], "m"), (whole[3:], "rad")):
-        _at_most(float(np.linalg.norm(part)), unit, MOST_PLATFORM)
-    return whole
-
-
-def _at_most(by: float, unit: str, most: float) -> float:
-    if abs(by) <= most:
-        return by
-    raise InvalidValueError("by", f"{by:g} {unit}", f"up to {most:g} {unit} at a time", "Jog in parts, or use go_to.")

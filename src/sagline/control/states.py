@@ -1,4 +1,4 @@
-"""States of the controller and one table of the transitions between them."""
+"""States of the controller, and one table of all transitions between states."""
 
 from __future__ import annotations
 
@@ -29,13 +29,10 @@ _FAULT: Final = {State.STOPPING: "a fault"}
 _STOP: Final = {State.STOPPING: "stop, or a fault"}
 _EMERGENCY: Final = {State.EMERGENCY: "emergency stop, or a broken cable"}
 
-# action of the winches in each state, and condition of the transition to each possible next state
+# for each state: action of the winches, and the condition for each possible next state
 TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     State.OFF: ("brakes", {State.CONNECTING: "the operator"}),
-    State.CONNECTING: (
-        "brakes",
-        {State.READY: "layouts, counters and owners agree", State.OFF: "they do not agree"},
-    ),
+    State.CONNECTING: ("brakes", {State.READY: "layouts, counters and owners agree", State.OFF: "they do not agree"}),
     State.READY: (
         "hold",
         {
@@ -86,13 +83,13 @@ OWNING: Final = frozenset(State) - {State.OFF, State.CONNECTING}
 
 
 class RefusedError(SaglineError):
-    """A request is rejected for a reason; nothing was sent.
+    """Error: a request was rejected, and no command was sent.
 
     Attributes:
         what: Rejected request.
         reason: Reason of the rejection.
         next_step: Next step for the reader.
-        item: Same text as `what`; all errors have this attribute.
+        item: Same text as `what`, because all errors have this attribute.
     """
 
     def __init__(self, what: str, reason: str, next_step: str) -> None:

@@ -1,4 +1,4 @@
-"""Base of all other folders: arrays, arguments, errors, numbers and results."""
+"""Base of all other folders: arrays, checks of arguments, errors, numbers as text, and results."""
 
 from sagline.core.surface import group
 

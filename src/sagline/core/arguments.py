@@ -21,7 +21,7 @@ from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 
-# type -> how to get an object of this type; this sentence ends the message about a wrong type
+# type name: sentence about the creation of an object of this type, the next step of messages about wrong types
 HOW_TO_GET: Final = MappingProxyType(
     {
         "AnchorErrors": "Give AnchorErrors(deviation), for instance 0.01 m, or None.",
@@ -58,13 +58,13 @@ HOW_TO_GET: Final = MappingProxyType(
         "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
 )
-LONGEST_TITLE: Final = 100  # largest number of characters of a name, which becomes part of file names
+LONGEST_TITLE: Final = 100  # largest number of characters of a name, because it becomes part of file names
 LONGEST_NAME = 255  # largest number of bytes of a file name on common file systems
 _PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", "tension")
 
 
 class _Brief(Repr):
-    """Short text of `value` for a message. If the text would be too long: the type of `value`."""
+    """Converter to short texts for messages; a long text is replaced by the type of the object."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -75,7 +75,7 @@ class _Brief(Repr):
     def repr_instance(self, x: Any, level: int) -> str:
         if isinstance(x, np.ndarray) and x.size > 3:
             return f"an array of {x.dtype} of shape {x.shape}"
-        # a result computes its summary for its short text, which may take long
+        # a result would compute its summary, which may take long
         short = getattr(type(x).__repr__, "__module__", "") == "sagline.core.results"
         if short or (type(x).__module__.startswith("sagline") and len(repr(x)) > self.maxother):
             return f"a {type(x).__name__}"
@@ -83,29 +83,29 @@ class _Brief(Repr):
 
 
 def brief(value: object) -> str:
-    """Short text of a value for a message, in one line; its type if the text is too long or raises an error."""
+    """One-line text of a value for a message; the type of the value if the text is too long or raises an error."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
     try:
         return printable(_Brief().repr(value))
-    except Exception:  # the text of an object comes from code of the caller, which may fail
+    except Exception:  # `repr` of a caller's object may fail
         return f"one of type {type(value).__name__}"
 
 
 def instance(value: object, kind: type[T], item: str) -> T:
-    """Return `value` unchanged after the check that its type is `kind`."""
+    """Check that `value` has the type `kind`, and return it."""
     if isinstance(value, kind):
         return value
     raise InvalidValueError(item, brief(value), _a(kind.__name__), _step_to(value, kind))
 
 
 def optional(value: object, kind: type[T], item: str) -> T | None:
-    """Return an argument unchanged after a check of its type; the argument may also be None."""
+    """Check that `value` is None or has the type `kind`, and return it."""
     return None if value is None else instance(value, kind, item)
 
 
 def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
-    """Check that `value` is one of the words `allowed`."""
+    """Check that `value` is one of the words `allowed`, and return it."""
     words = tuple(allowed)
     if isinstance(value, str) and value in words:
         return str(value)  # numpy has its own string type
@@ -120,7 +120,7 @@ def word_of(name: str) -> str:
 
 
 def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str) -> T:
-    """Return an object of type `kind` unchanged. A name such as "minimum-norm" gives an object with default options."""
+    """Object of type `kind` from `value`, which is such an object or a name of `kinds`, such as "minimum-norm"."""
     if not isinstance(value, str):
         return instance(value, kind, item)
     words = {word_of(name): kind for name, kind in kinds.items()}
@@ -128,7 +128,7 @@ def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str
 
 
 def text(value: Any, item: str) -> str:
-    """Check that `value` is a text that a terminal can display. It may have several lines."""
+    """Check that `value` is a text, possibly with several lines, that a terminal can display."""
     if not isinstance(value, str):
         raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
     if (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
@@ -147,7 +147,7 @@ def label(value: Any, item: str) -> str:
 
 
 def integer(value: Any) -> int | None:
-    """The integer `value`, or None if it is none, such as a Boolean or an array with one element."""
+    """Python integer equal to `value`; None if `value` is not an integer, for example a Boolean or an array."""
     if isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.ndim):
         return None
     try:
@@ -157,7 +157,7 @@ def integer(value: Any) -> int | None:
 
 
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
-    """Check that `value` is a whole number from `low` to `high`; an integer of Python or numpy, not a Boolean."""
+    """Check that `value` is an integer of Python or numpy from `low` to `high`, and not a Boolean."""
     number = integer(value)
     if number is not None and low <= number <= high:
         return number
@@ -177,7 +177,7 @@ def flag(value: Any, item: str) -> bool:
 def elements(
     value: Any, single: Any, item: str, step: str, allowed: str = "one or several in a list"
 ) -> tuple[Any, ...]:
-    """Elements of the iterable `value`; a `single` is one element; texts, mappings and numbers are refused."""
+    """Elements of the iterable `value`, or `value` itself if its type is `single`; refuses texts and mappings."""
     if isinstance(value, single):
         return (value,)
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
@@ -186,7 +186,7 @@ def elements(
 
 
 def listed(value: Any, kind: type[T], item: str) -> tuple[T, ...]:
-    """Check one object of type `kind`, or an iterable of several. Returns the objects as a tuple."""
+    """Tuple of the object or objects in `value`, after the check that each has the type `kind`."""
     allowed, step = f"{_a(kind.__name__)}, or several in a list", _step_to(value, kind)
     given = elements(value, kind, item, step, allowed)
     if not given:
@@ -204,12 +204,12 @@ def callback(value: Any, item: str) -> Any:
 
 
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
-    """Check the path of a file or folder, a text or a path object."""
+    """Checked path of a file or folder, from a text or a path object."""
     given = os.fspath(file) if isinstance(file, os.PathLike) and not isinstance(file, type) else file
     if not isinstance(given, str):
         raise InvalidValueError(item, brief(file), "the path of a file, a text or a Path", f"Give {item} as a text.")
     if not given.strip():
-        raise FileError(".", f"is the present folder, because {item} is empty", "Give the name of a file.")
+        raise FileError(".", f"is the current folder, because {item} is empty", "Give the name of a file.")
     path = Path(given)
     if not path.name and not folder:
         raise FileError(path, "is a folder", "Give the name of a file in it.")
@@ -229,7 +229,7 @@ def _a(name: str) -> str:
 
 
 def _step_to(value: object, kind: type) -> str:
-    """Next step in a message: how to get an object of type `kind` from `value`."""
+    """Next step in a message: sentence about the creation of an object of type `kind`, possibly from `value`."""
     if isinstance(value, type) and issubclass(value, kind):
         return f"Add parentheses to create one: {value.__name__}()."
     if type(value).__module__.startswith("sagline"):

@@ -1,6 +1,6 @@
-"""Conversion of a caller's numbers to arrays for the kernels: float64, C-contiguous, write-locked.
+"""Conversion of numbers to arrays for the kernels: float64, C-contiguous, read-only.
 
-A kernel is compiled once per memory layout of its arguments. Every array for a kernel is therefore converted here.
+All arrays for kernels have the same memory layout, because a kernel is compiled again for every other layout.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ Codes = NDArray[np.int8]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# limit of all values: larger than any value of a machine in any unit, but with a finite square and cube
+# Largest allowed magnitude of a number. No machine needs more, and square and cube are still finite.
 LARGEST: Final = 1e50
-FARTHEST: Final = 1e6  # largest allowed coordinate of a point [m], larger than on any machine
+FARTHEST: Final = 1e6  # largest allowed coordinate of a point [m]; no machine is larger
 SMALLEST: Final = 1e-50  # smallest allowed value of a quantity that must be positive
 _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 
 
 def locked(array: NDArray[Any]) -> NDArray[Any]:
-    """Write-lock an array that sagline created; the array is not copied."""
+    """Make an array read-only, without a copy, and return it."""
     array.flags.writeable = False
     return array
 
@@ -45,11 +45,11 @@ def checked(
     infinite: bool = False,
     missing: bool = False,
 ) -> Array:
-    """Locked float64 copy of `value`, C-contiguous. If `value` is not allowed, the error names the problem.
+    """Read-only, C-contiguous float64 copy of `value`; raises an error if `value` is not allowed.
 
-    unit: unit of the value, for the message; shape: required trailing axes, with None for any length; None (default)
-    accepts every shape; above: limit that every value must exceed; missing: True if NaN is allowed. An array that
-    already has all these properties and owns its memory, such as a result of sagline, is returned without a copy.
+    The message contains `unit`. `shape` states the required lengths of the last axes; None allows any length or any
+    shape. Every value must exceed `above`. `missing` allows NaN. A read-only array with all these properties that owns
+    its memory, such as a result of sagline, is returned without a copy.
     """
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
@@ -60,13 +60,13 @@ def checked(
 
 
 def numbers(value: ArrayLike, item: str, unit: str) -> Array:
-    """Float64 copy of real numbers in C order. Any shape and value is valid, also NaN; no mask, no unit."""
+    """C-contiguous float64 copy of real numbers of any shape and value, also NaN; refuses masked arrays and units."""
     if type(value) in (float, np.float64):
         return np.array(value)
     _refuse_masked_or_with_unit(value, item, unit)
     try:
         size = value.size if isinstance(value, np.ndarray) else len(value)  # type: ignore[arg-type]
-    except Exception:  # a number has no length, and a caller's object may raise any error
+    except Exception:  # `len` of a caller's object may raise any error
         size = 1
     check_memory(item, 8.0 * size, "Give fewer numbers.")
     try:
@@ -76,18 +76,18 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
         return _from_other_kind(given, item)
     except InvalidValueError:
         raise
-    except Exception as error:  # a caller's object may raise any error during conversion
+    except Exception as error:  # the conversion of a caller's object may raise any error
         reason = brief(error.args[0] if error.args else error).strip("'\"")
         raise InvalidValueError(item, brief(value), "numbers", f"Give {item} as plain numbers ({reason}).") from None
 
 
 def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """The single finite number `value`; above: limit that the value must exceed."""
+    """Checked single finite number; above: limit that it must exceed."""
     return float(exactly(value, item, unit, (), low=low, above=above))
 
 
 def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """Check that the array `value` has exactly the shape `shape`. Batch axes are not allowed."""
+    """Checked array with exactly the shape `shape`, without batch axes."""
     array = checked(value, item, unit, **limits)
     if array.shape != shape:
         allowed = f"shape {shape}" if shape else "a single number"
@@ -98,7 +98,7 @@ def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **li
 def refuse_first(
     wrong: Flags, item: str, values: Array, unit: str, allowed: str, step: str, limits: Array | None = None
 ) -> None:
-    """Refuse the first of `values` for which `wrong` is True; {i} and {limit} in `allowed` are its index and limit."""
+    """Raise an error for the first value with `wrong` True; {i}, {limit} in `allowed` become its index and limit."""
     if wrong.any():
         k, index = int(np.argmax(wrong)), ", ".join(str(i) for i in np.argwhere(wrong)[0])
         where, limit = f"{item}[{index}]" if index else item, np.nan if limits is None else limits.flat[k]
@@ -106,7 +106,7 @@ def refuse_first(
 
 
 def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Broadcast `value` to `shape` in the memory layout of the kernels. A copy is made only if necessary."""
+    """Array of shape `shape` in the memory layout of the kernels, to which `value` is broadcast; copied if needed."""
     array = np.asarray(value, dtype=np.float64, order="C")
     if array.shape != shape:
         array = np.asarray(np.broadcast_to(array, shape), order="C")
@@ -114,12 +114,12 @@ def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def spread(array: Array, shape: tuple[int, ...]) -> Array:
-    """Array from `checked`, broadcast to `shape` and write-locked."""
+    """Read-only array: the result of `checked`, broadcast to `shape`."""
     return array if array.shape == shape else locked(np.array(np.broadcast_to(array, shape), order="C"))
 
 
 def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """The shape to which several arrays broadcast; item: name of the arrays, for the message."""
+    """Common shape to which several arrays broadcast; item: name of the arrays in the message."""
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
@@ -129,7 +129,7 @@ def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
-    """True if the value and the array that owns its memory are locked float64 arrays in C order."""
+    """True if `value` and the array that owns its memory are read-only, C-contiguous float64 arrays."""
     if not (type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous):
         return False
     holder: object = value
@@ -141,7 +141,7 @@ def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
 
 
 def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
-    """Refuse masked arrays and quantities with units. numpy would silently remove the mask or the unit."""
+    """Refuse masked arrays and quantities with units, because numpy would silently drop the mask or the unit."""
     if type(value) in (np.ndarray, int, list, tuple):
         return
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
@@ -156,9 +156,9 @@ def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
 
 
 def _from_other_kind(given: NDArray[Any], item: str) -> Array:
-    """Convert long doubles and number objects of Python; refuse values that are not real numbers."""
+    """Float64 array from long doubles and Python's number objects; refuses values that are not real numbers."""
     if given.dtype.kind in "fO" and (given.dtype.kind == "f" or all(_is_real(entry) for entry in given.flat)):
-        with np.errstate(over="ignore"):  # an overflow gives infinity, which is refused
+        with np.errstate(over="ignore"):  # overflow gives infinity, which is refused later
             return np.array(given, dtype=np.float64, order="C")
     shown = next((entry for entry in given.flat if not _is_real(entry)), given) if given.dtype.kind == "O" else given
     kind = _KINDS.get(given.dtype.kind, "")
@@ -168,7 +168,7 @@ def _from_other_kind(given: NDArray[Any], item: str) -> Array:
 
 
 def _listed(value: object) -> str:
-    """Text for a message about a value that is not a number."""
+    """Text of a value that is not a number, for a message."""
     return brief(value.item() if isinstance(value, np.ndarray) and value.size == 1 else value)
 
 
@@ -177,11 +177,11 @@ def _is_real(entry: object) -> bool:
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:
-    """True if all values are finite and in range. The tests of minimum and maximum suffice, because NaN propagates."""
+    """True if all values are finite and in range. A test of minimum and maximum also detects NaN."""
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())
-    tiny = above == 0.0 and 0.0 < smallest < SMALLEST  # too small to divide by
+    tiny = above == 0.0 and 0.0 < smallest < SMALLEST  # a division by it would overflow
     return smallest >= max(low, -LARGEST) and smallest > above and largest <= LARGEST and not tiny
 
 

@@ -1,4 +1,4 @@
-"""Exceptions and warnings of sagline, in one class hierarchy, with data fields and a one-line message."""
+"""Exceptions and warnings of sagline, which have data fields and a message of one line."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
-_WORD: Final = 60  # number of characters at the beginning of a given text that are compared with known words
-LONGEST: Final = 299  # largest number of characters of a terminal line; longer messages are shortened
-HEAD: Final = "Error: "  # prefix of a message
-MOST: Final = LONGEST - len(HEAD)  # largest number of characters of a message
-LEAST: Final = 30  # smallest number of characters of each part in a shortened message
+_WORD: Final = 60  # number of first characters of a text that are compared with known words
+LONGEST: Final = 299  # largest number of characters of a printed message; a longer message is shortened
+HEAD: Final = "Error: "  # prefix of a printed message
+MOST: Final = LONGEST - len(HEAD)  # largest number of characters of a message without prefix
+LEAST: Final = 30  # smallest number of characters of each part of a shortened message
 
 
 class SaglineError(Exception):
-    """Base class of all exceptions that sagline raises on purpose; its text states the next step."""
+    """Base class of all exceptions that sagline raises on purpose; the text of each states the next step."""
 
 
 class SaglineWarning(UserWarning):
-    """Warning about a valid result; the text states the reason and the next step."""
+    """Warning that a valid result needs attention; the text states the reason and the next step."""
 
 
 class InvalidValueError(SaglineError, ValueError):
     """A value that is not allowed.
 
     Attributes:
-        item: Name of the quantity, in the user's words ("cable 3: linear_density").
+        item: Name of the quantity as the user has written it, such as "cable 3: linear_density".
         value: The refused value, as text, with its unit.
         allowed: The allowed range or type of the value.
         next_step: Next step for the user.
     """
 
     def __init__(self, item: str, value: object, allowed: str, next_step: str) -> None:
-        """Compose the message from its four parts."""
+        """Create an error with a message of four parts."""
         super().__init__(item, value, allowed, next_step)
         self.item = item
         self.value = value
@@ -42,18 +42,18 @@ class InvalidValueError(SaglineError, ValueError):
         self.next_step = next_step
 
     def __str__(self) -> str:
-        """One line: item, value, allowed range, next step."""
+        """Message in one line: item, value, allowed range, next step."""
         parts = (str(self.item), str(self.value), str(self.allowed), str(self.next_step))
         item, value, allowed, next_step = shortened(parts, room=MOST - len(" is ; allowed: . "))
         return f"{item} is {value}; allowed: {allowed}. {next_step}"
 
 
 class CableGeometryError(InvalidValueError):
-    """Impossible positions of the two ends of a cable."""
+    """The two ends of a cable are at impossible positions."""
 
 
 class NoSuchEntryError(InvalidValueError, IndexError):
-    """An index outside a batch."""
+    """An index is outside a batch."""
 
 
 class NoBatchError(InvalidValueError, TypeError):
@@ -61,19 +61,19 @@ class NoBatchError(InvalidValueError, TypeError):
 
 
 class FileError(SaglineError):
-    """A file that cannot be read or written.
+    """A file cannot be read or written.
 
     Attributes:
         path: The file or folder.
         reason: Description of the problem.
         next_step: Action that solves the problem.
-        item: Wrong part of the file ("cable 3: linear_density", "line 12"), or the path if the whole file is wrong.
-        value: Value of the item, as text with its unit; the reason if the value is not known.
+        item: Wrong part of the file, such as "cable 3: linear_density"; the path if the whole file is wrong.
+        value: Value of the item, as text with unit; the reason if the value is not known.
         allowed: Allowed values of the item; empty if not known.
     """
 
     def __init__(self, path: Path | str, reason: str, next_step: str, *, item: str | None = None) -> None:
-        """Compose the message from its three parts."""
+        """Create an error with a message of three parts."""
         super().__init__(path, reason, next_step)
         self.path = Path(path)
         self.reason = reason
@@ -84,14 +84,14 @@ class FileError(SaglineError):
 
     @classmethod
     def of(cls, path: Path | str, error: InvalidValueError) -> FileError:
-        """Convert the error of a value to the error of the file that contains the value.
+        """Create a `FileError` from the error of a value in the file.
 
         Args:
             path: The file.
             error: The error of a value in the file.
 
         Returns:
-            The error, to be raised.
+            Error that the caller can raise.
         """
         found = cls(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step)
         found.item, found.value, found.allowed = str(error.item), str(error.value), str(error.allowed)
@@ -99,29 +99,29 @@ class FileError(SaglineError):
 
     @classmethod
     def not_installed(cls, package: str | None, needed: str, extra: str) -> FileError:
-        """Error for a missing package, with the command that installs it.
+        """Create the error of a missing package, with the command that installs the package.
 
         Args:
             package: Name of the package.
-            needed: Reason for the package, for example "Meshes need it".
-            extra: The extra of sagline that installs it.
+            needed: Reason why the package is needed, for example "Meshes need it".
+            extra: Extra of sagline that installs the package.
 
         Returns:
-            The error, to be raised.
+            Error that the caller can raise.
         """
         return cls(f"package {package}", "is not installed", f'{needed}: pip install "sagline[{extra}]"')
 
     def __str__(self) -> str:
-        """One line: file, reason, next step."""
+        """Message in one line: file, reason, next step."""
         path, reason, next_step = shortened((str(self.path), self.reason, self.next_step), room=MOST - len(": . "))
         return f"{path}: {reason}. {next_step}"
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Text for a terminal, without characters that move the cursor, hide a letter or cannot be encoded.
+    r"""Text that a terminal can print: invisible characters are replaced by escape sequences.
 
-    text: any text; kept: characters that remain unchanged, for instance line ends. Returns the text with control
-    characters, line ends, lone surrogates and all other invisible characters as Python escape sequences.
+    Control characters, line ends, lone surrogates and other invisible characters become Python escape sequences. kept:
+    characters that stay unchanged, for instance line ends.
 
     Examples:
         >>> from sagline.core.errors import printable
@@ -134,14 +134,14 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def is_seen(character: str) -> bool:
-    """True for a visible character and for a space; False for formatting marks, such as U+200E and U+200B."""
+    """True for a visible character or a space; False for a formatting mark, such as U+200E or U+200B."""
     return character.isprintable() or unicodedata.category(character) == "Zs"
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that the user probably meant, for the question "Did you mean".
+    """Word of `known` that is most similar to `word`, for the question "Did you mean"; None if no word is similar.
 
-    Returns the nearest known word, or None if no word is similar.
+    Only the first `_WORD` characters are compared.
 
     Examples:
         >>> from sagline.core.errors import nearest
@@ -154,7 +154,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def shortened(parts: Sequence[str], room: int) -> list[str]:
-    """Shorten `parts` to `room` characters by omitting the middle of the longest; escape invisible characters."""
+    """Printable texts of `parts` with together at most `room` characters; long parts lose their middle."""
     texts = [printable(part) for part in parts]
     while (excess := sum(map(len, texts)) - room) > 0:
         k = max(range(len(texts)), key=lambda k: len(texts[k]))

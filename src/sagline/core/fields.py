@@ -1,9 +1,9 @@
-"""Fields of input types. The declaration of a field is the only definition of its name, default, unit and range.
+"""Fields of input types. The declaration of a field defines its name, default, unit and range.
 
-A type is `attrs.frozen`. Each field has a converter, which gives type checkers the type of the constructor argument.
-Its metadata are the arguments of `sagline.core.arrays.checked`. `__attrs_post_init__` checks the values. If each field
-declares its complete check, this method is `check_fields`. A dataclass of single numbers derives from `NumberFields`
-and declares its ranges in the same way.
+An input type is a class with `attrs.frozen`. The converter of a field states the type of the constructor argument for
+type checkers. The metadata of a field are arguments of `sagline.core.arrays.checked`, with which `__attrs_post_init__`
+checks the value. If the metadata of all fields are complete, `check_fields` is used as `__attrs_post_init__`. A
+dataclass of single numbers derives from `NumberFields` and declares ranges in the same way.
 """
 
 from __future__ import annotations
@@ -20,37 +20,32 @@ from sagline.core.arrays import Array, number
 
 
 def given(value: ArrayLike) -> Array:
-    """Return a value unchanged. This converter gives type checkers the type of the argument."""
+    """Converter that returns a value unchanged, and gives type checkers the type of the constructor's argument."""
     return value  # type: ignore[return-value]
 
 
 def if_known(value: ArrayLike | None) -> Array | None:
-    """Return a value or None unchanged: the converter of an optional field."""
-    return value  # type: ignore[return-value]
-
-
-def given_or_none(value: ArrayLike | None) -> Array:
-    """Return a value or None unchanged: the converter of a field whose check then replaces None by a value."""
+    """Converter of an optional field, which returns a value or None unchanged."""
     return value  # type: ignore[return-value]
 
 
 def given_by_name(value: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
-    """Return values by name unchanged."""
+    """Converter of a field with a dictionary from names to values, which is returned unchanged."""
     return value  # type: ignore[return-value]
 
 
 def rule(unit: str = "", **limits: Any) -> dict[str, Any]:
-    """Metadata of a field: the arguments with which `checked` checks its value."""
+    """Metadata of a field that is checked with `checked`: the arguments of `checked`."""
     return {"unit": unit, **limits}
 
 
 def checked_by(check: Callable[..., Any], *arguments: Any, **limits: Any) -> dict[str, Any]:
-    """Metadata of a field: a check from `core.arguments`, and its arguments after value and name."""
+    """Metadata of a field that is checked with the function `check`, and further arguments of this function."""
     return {"check": lambda value, item: check(value, item, *arguments, **limits)}
 
 
 def check_fields(made: Any) -> None:
-    """Check each field of the new object `made` with its `checked_by`. None is allowed if None is the default."""
+    """Check each field of the new object `made` with the check in its metadata. A default of None is allowed."""
     for about in fields(type(made)):
         value = getattr(made, about.name)
         if "check" in about.metadata and not (value is None and about.default is None):
@@ -58,15 +53,15 @@ def check_fields(made: Any) -> None:
 
 
 class NumberFields:
-    """Base of dataclasses with single numbers as fields. Fields with a `rule` as metadata are checked at construction.
+    """Base class of dataclasses with single numbers. The constructor checks fields that have a `rule` as metadata.
 
-    A field whose rule has `most` is a whole number from 0 to `most`. None is allowed if None is the default.
+    A field with `most` in its rule is a whole number from 0 to `most`. None is allowed as a default value.
     """
 
     __slots__ = ()
 
     def __post_init__(self) -> None:
-        """Check the values."""
+        """Check all fields that have a rule."""
         for about in dataclasses.fields(self):  # type: ignore[arg-type]
             value, limits = getattr(self, about.name), dict(about.metadata)
             if not limits or (value is None and about.default is None):
@@ -77,7 +72,7 @@ class NumberFields:
 
 
 def reduced(value: Any) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
-    """Pickle the object through its constructor, which checks and locks a loaded value."""
+    """Pickle an object as a call of its constructor, which checks the loaded values and makes them read-only."""
     kind = type(value)
     values = {about.name: getattr(value, about.name) for about in fields(kind)}
     return _constructed, (kind, {name: dict(own) if isinstance(own, Mapping) else own for name, own in values.items()})
@@ -88,5 +83,5 @@ def _constructed(kind: type[Any], values: dict[str, Any]) -> Any:
 
 
 def units(kind: type[Any]) -> dict[str, str]:
-    """Unit of each field of the input type `kind`, "" if dimensionless."""
+    """Dictionary from the fields of the input type `kind` to their units; "" for a dimensionless field."""
     return {field.name: field.metadata["unit"] for field in fields(kind)}

@@ -1,4 +1,4 @@
-"""Indices along the first axis of a batch of poses, cables or equilibria."""
+"""Checks of indices along the first axis of a batch of poses, cables or equilibria."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.core.errors import NoBatchError, NoSuchEntryError
 def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
     """Checked index along the first axis of a batch: an integer, a slice, or an array of integers or booleans.
 
-    index: as given by a caller; shape: shape of the batch, () for a single entry; single: name of a single entry.
+    shape: shape of the batch, () for a single entry; single: name of a single entry in the message.
     """
     if not shape:
         raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; use it directly.")
@@ -32,7 +32,7 @@ def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
 
 
 def batch_length(shape: tuple[int, ...], single: str) -> int:
-    """Number of entries along the first axis of a batch of shape `shape`; single: name of a single entry."""
+    """Number of entries along the first axis of a batch of shape `shape`; single: name of an entry in the message."""
     if not shape:
         raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; use it directly.")
     return shape[0]
@@ -62,6 +62,6 @@ def _no_entry(index: object, size: int) -> NoSuchEntryError:
 
 
 def evenly_spaced(count: int, most: int) -> NDArray[np.int64]:
-    """At most `most` of `count` indices, with equal steps except for rounding; the first and the last are included."""
+    """At most `most` of the indices 0 to `count` - 1, at nearly equal steps, with the first and the last index."""
     places = np.linspace(0, max(count - 1, 0), min(count, most))
     return np.unique(places.round().astype(np.int64))

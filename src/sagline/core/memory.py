@@ -9,26 +9,26 @@ from typing import Final
 
 from sagline.core.errors import InvalidValueError
 
-UNASKED: Final = 1 << 26  # smaller allocations are not checked [bytes]
-_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory per pose, and per cable of a pose [bytes]
-_BEHIND_BYTES = 72.0  # measured memory per cable for its routing [bytes]
-_GROUPS: Final = (  # files with the memory limit and the used memory of a container
+UNASKED: Final = 1 << 26  # [bytes], smaller allocations are not checked
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # [bytes], measured memory per pose, and per cable and pose
+_BEHIND_BYTES = 72.0  # [bytes], measured memory per cable and pose for the routing
+_GROUPS: Final = (  # files that contain the memory limit and the used memory of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
 
 
 def check_memory(item: str, size: float, next_step: str) -> None:
-    """Refuse an allocation of `size` bytes that does not fit into memory; item: its purpose. 64 MB are not checked."""
+    """Refuse an allocation of more than 64 MB that does not fit into memory; size [bytes]; item: its purpose."""
     if size > UNASKED and size > (free := free_memory()):
-        # the two numbers must differ in the message
+        # the message needs so many digits that the two numbers differ
         digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)
         wanted, left = f"{size / 1e9:.{digits}g} GB", f"<= {free / 1e9:.{digits}g} GB, which are free"
         raise InvalidValueError(f"the memory for {item}", wanted, left, next_step)
 
 
 def check_poses(count: int, cable_count: int, behind: bool) -> None:
-    """Refuse kinematics of `count` poses that do not fit into memory; behind: True with pulleys or dead lengths."""
+    """Refuse kinematics of `count` poses that need too much memory; behind: True with pulleys or dead lengths."""
     cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
     check_memory(
         f"a batch of {count:,} poses", count * (_POSE_BYTES + cable * cable_count), "Solve the batch in parts."
@@ -36,7 +36,7 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 
 
 def free_memory() -> float:
-    """Smallest free memory of computer, container and process [bytes]; infinite if the system does not report it."""
+    """Free memory that computer, container and process limits allow [bytes]; infinite if the system reports none."""
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf
         free.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))

@@ -1,4 +1,4 @@
-"""Long calculations in blocks, with interrupts and progress reports between the blocks."""
+"""Division of long calculations into blocks, between which Ctrl-C is handled and progress is reported."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import TypeAlias
 
 from sagline.core.arrays import Array
 
-# called after each block with the number of finished rows and the number of all rows
+# function that is called after each block with the number of finished rows and the number of all rows
 Progress: TypeAlias = Callable[[int, int], None]
 
 
 def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
-    """Slices that divide `count` rows into blocks of at most `size` rows. Progress is reported after each block."""
+    """Slices that divide `count` rows into blocks of at most `size` rows; progress is called after each block."""
     for first in range(0, count, size):
         part = slice(first, min(first + size, count))
         yield part
@@ -21,5 +21,5 @@ def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[
 
 
 def rows_of(array: Array, part: slice) -> Array:
-    """Rows `part` of `array`. An array with a single row applies to all entries and is returned unchanged."""
+    """Rows `part` of `array`. An array with a single row is for all entries, and is returned unchanged."""
     return array if len(array) == 1 else array[part]

@@ -1,4 +1,4 @@
-"""Tables of results: columns of numbers with units, for printing, CSV, pandas and xarray."""
+"""Tables of results with named columns and units, for printing, CSV, pandas and xarray."""
 
 from __future__ import annotations
 
@@ -13,34 +13,35 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sagline.core.arguments import file_path
 from sagline.core.errors import FileError
 from sagline.core.numbers import counted
 from sagline.core.results import documented_units, formats
 
-# imported by name when a table is written, because `files` imports this module
+# module that is imported when a table is written, because `files` imports this module
 _WRITING: Final = "sagline.files.writing"
-_WIDTH, _ENDS = 80, 4  # columns of a terminal; printed rows at the beginning and at the end
+_WIDTH, _ENDS = 80, 4  # width of a terminal; number of printed rows at each end of a table
 
-# Declaration of the columns of a result: each column is a text "label=attribute [unit]", or a tuple of this text and
-# the type of its status codes. An attribute may have dots; a number after a dot is an index of the last axis. In a
-# label, # means the number of a cable, and @ means x, y, z (and w). The default label is the name of the attribute. The
-# default unit is the unit in its documentation.
+# Declaration of the columns of a result. A column is a text "label=attribute [unit]", or a tuple of this text and the
+# type of the status codes in the column. An attribute can be a path with dots, such as "pose.position"; a number after
+# a dot is an index of the last axis. In a label, # is replaced by the index of a cable, and @ by x, y, z (and w). The
+# default label is the name of the attribute. The default unit is the unit in the documentation of the attribute.
 Columns = tuple[str | tuple[str, type[Any]], ...]
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """The text of a CSV file: column names with units in brackets, then rows. Floats are written without rounding."""
+    """Text of a CSV file: a line of column names with units, then rows with all digits of the numbers."""
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
 class Table:
-    """Columns of equal length, each with a name and a unit.
+    """Table with columns of equal length, each with a name and a unit.
 
     Attributes:
-        columns: Numbers or words of each column, shape (rows,).
-        units: Unit of each column; "" if it has none.
+        columns: Dictionary from the name of each column to its numbers or words, shape (rows,).
+        units: Dictionary from the name of each column to its unit; "" for a column without a unit.
     """
 
     __slots__ = ("columns", "units")
@@ -54,7 +55,7 @@ class Table:
         return len(next(iter(self.columns.values()), ()))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """The column `name`."""
+        """Numbers or words of the column `name`, shape (rows,)."""
         return self.columns[name]
 
     @property
@@ -64,12 +65,12 @@ class Table:
 
     @property
     def rows(self) -> list[list[object]]:
-        """Names of the columns, then the rows; "" for NaN."""
+        """Row of the column names, then all rows of values; "" for NaN."""
         body = zip(*(column.tolist() for column in self.columns.values()), strict=True)
         return [[*self.head], *(["" if cell != cell else cell for cell in row] for row in body)]
 
     def __repr__(self) -> str:
-        """Text with the first and last rows, and with the columns that fit into a terminal."""
+        """Text of the table that fits into a terminal: the first and last rows, and the first columns."""
         count = len(self)
         some = [*range(_ENDS), *range(count - _ENDS, count)] if count > 2 * _ENDS else list(range(count))
         texts: list[list[str]] = []
@@ -87,15 +88,15 @@ class Table:
         return "\n".join([*lines, f"{counted(count, 'row')}, {len(self.columns)} columns{more}"])
 
     def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
-        """The table as CSV; see `Tabular.to_csv`."""
+        """Write the table as CSV; see `Tabular.to_csv`."""
         text = csv_text(self.rows)
         if file is None:
             return text
-        import_module(_WRITING).write_text(file, text)
+        import_module(_WRITING).write_text(file_path(file), text)
         return None
 
     def to_dataframe(self) -> Any:
-        """The table as a DataFrame; see `Tabular.to_dataframe`."""
+        """Convert the table to a DataFrame; see `Tabular.to_dataframe`."""
         try:
             pandas = import_module("pandas")
         except ModuleNotFoundError:
@@ -106,16 +107,16 @@ class Table:
 
 
 class Tabular:
-    """A result with one row per pose, sample or mode."""
+    """Base class of results that can be converted to a table with one row per pose, sample or mode."""
 
     __slots__ = ()
     _columns: ClassVar[Columns]
 
     def table(self) -> Table:
-        """The rows as a table, which prints its first and last rows.
+        """Create a table of the result; a printed table shows its first and last rows.
 
         Returns:
-            Columns by name, with their units: `table["x"]`, `table.units["x"]`.
+            Table; `table["x"]` is the column x, and `table.units["x"]` is its unit.
 
         Examples:
             >>> import sagline as sl
@@ -127,10 +128,10 @@ class Tabular:
         return Table({name: values for name, values, _ in found}, {name: unit for name, _, unit in found})
 
     def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
-        """The rows as CSV. The header contains the units in brackets; an empty cell means NaN.
+        """Write the table of the result as CSV. The header contains units in brackets; an empty cell means NaN.
 
         Args:
-            file: File that is written atomically; with None, the method returns the text.
+            file: File, which is written atomically; None to return the text.
 
         Returns:
             The text, or None if a file was written.
@@ -147,7 +148,7 @@ class Tabular:
         return self.table().to_csv(file)
 
     def to_dataframe(self) -> Any:
-        """The rows as a pandas DataFrame.
+        """Convert the table of the result to a pandas DataFrame.
 
         Returns:
             DataFrame with the columns of `table`; `attrs["units"]` contains the units of the columns.
@@ -164,14 +165,14 @@ class Tabular:
         return self.table().to_dataframe()
 
     def to_xarray(self) -> Any:
-        """The result as an xarray Dataset.
+        """Convert the result to an xarray Dataset.
 
         Returns:
-            The data set that `save` writes to a NetCDF file, with units and robot. If the result has no NetCDF format,
-            the data set contains the columns of `table`, with the dimension `row`.
+            Dataset with units and robot, as `save` writes it to a NetCDF file. The Dataset of a result without a NetCDF
+            format contains the columns of `table`, with the dimension `row`.
 
         Raises:
-            InvalidValueError: If the result has a cable model, a tension method or a criterion of your own.
+            InvalidValueError: If the result contains a cable model, a tension method or a criterion of your own.
 
         Examples:
             >>> import sagline as sl
@@ -183,7 +184,7 @@ class Tabular:
 
 
 def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
-    """Name, values (rows,) and unit of each column that a result has."""
+    """Name, values (rows,) and unit of each column of a result's table."""
     for declared in type(result)._columns:
         text, codes = declared if isinstance(declared, tuple) else (declared, None)
         text, _, unit = text.removesuffix("]").partition(" [")
@@ -192,7 +193,7 @@ def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
         if value is None:
             continue
         label, unit = label or place.rpartition(".")[2], unit or ", ".join(units)
-        if hasattr(value, "quaternion"):  # a pose
+        if hasattr(value, "quaternion"):  # the value is a pose
             yield from _spread(("x", "y", "z"), value.position, "m")
             yield from _spread(("qx", "qy", "qz", "qw"), value.quaternion, "")
         elif "#" in label or "@" in label:
@@ -205,13 +206,13 @@ def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
 
 
 def _spread(names: Any, values: NDArray[Any], unit: str) -> Iterator[tuple[str, NDArray[Any], str]]:
-    """One column for each entry of `values` along the last axis, with its name from `names`."""
+    """Column for each entry of `values` along the last axis; names: name of each column."""
     for k, name in enumerate(names):
         yield name, np.atleast_1d(values[..., k]), unit
 
 
 def _found(result: Any, place: str) -> tuple[Any, list[str]]:
-    """Value and documented units of the attribute `place`, such as "pose.position". None if a part is missing."""
+    """Value and documented units of the attribute `place`, such as "pose.position"; None if the value is missing."""
     units: list[str] = []
     for name in place.split("."):
         if result is None:

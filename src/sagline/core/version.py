@@ -1,4 +1,4 @@
-"""Version of the installed package; loaded when it is first used."""
+"""Version of the installed package, which is read at its first use."""
 
 from importlib.metadata import version
 

@@ -1,7 +1,7 @@
 """Source text for controllers: C99 of a robot's kinematics, translated from the kernels, and SCL for TIA Portal.
 
-`tools/translate/portable.py` translates the kernels in parts when the package is built. The C source of a robot
-contains the necessary parts, the data of the robot, and functions to call.
+When the package is built, `tools/translate/portable.py` translates the kernels in parts. The C source of a robot
+contains the parts that this robot needs, its data, and functions for the caller.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import atomic_files
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.forward.platform import FORWARD_NUMBERS, LAST_COLUMNS
 from sagline.kinematics.forward import DEPTH, centered_positions
 from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.status import ForwardStatus, PoseStatus
@@ -57,24 +56,24 @@ def export_c(
 ) -> tuple[Path, Path, Path]:
     """Write C99 source of a robot's kinematics for a microcontroller, and SCL source of one function for a PLC.
 
-    NAME.c contains the data of the robot, the translated kernels of `inverse` and, on request, those of `forward`. The
-    source uses no heap and no recursion, all loops are bounded, and each function returns a status. NAME.h declares the
-    functions and states their bounds. NAME.scl contains the function P3 of docs/model.md in SCL for a Siemens PLC. It
-    has not been compiled yet.
+    NAME.c contains the data of the robot, the translated kernels of `inverse` and, if `forward` is true, the kernels of
+    `forward`. The source uses no heap and no recursion, all loops are bounded, and each function returns a status.
+    NAME.h declares the functions and states the bounds of their loops. NAME.scl contains the function P3 of
+    docs/model.md in SCL for a Siemens PLC. The SCL source has not been compiled yet.
 
     Args:
         robot: The robot; its winches may have pulleys and dead lengths, but no guides.
         file: Path of the source, sagline.c; the other files are in the same folder. Existing files are replaced.
         tension: Tension distribution method, or several methods. With several methods, each call selects one of them.
         forward: True to include the forward kinematics.
-        single_precision: True for numbers of type `float`, for controllers with hardware for single precision only.
+        single_precision: True for numbers of type `float`, for controllers with single precision in hardware.
 
     Returns:
         Paths of the source, the header and the SCL text.
 
     Raises:
-        InvalidValueError: If the winches have guides. If a method does not support the robot. If a number exceeds
-            single precision.
+        InvalidValueError: If the winches have guides. If a method does not support the robot. If a number is too large
+            for single precision.
         FileError: If the name does not end in .c, a file cannot be written, or the package was not built.
 
     Examples:
@@ -89,8 +88,8 @@ def export_c(
     if not methods:
         raise InvalidValueError("tension", "empty", "a method or several", "Give a method, for example Closest().")
     chosen = [method_of(method) for method in methods]
-    path = checked_name(file_path(file), ".c", "C source", "sagline")
-    source, header = source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
+    path = _checked_name(file_path(file), ".c", "C source", "sagline")
+    source, header = _source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
     texts = {path: source, path.with_suffix(".h"): header, path.with_suffix(".scl"): filled("c/sagline.scl", {})}
     with atomic_files(path.parent, [place.name for place in texts]) as partials:
         for partial, text in zip(partials, texts.values(), strict=True):
@@ -99,7 +98,7 @@ def export_c(
     return source_path, beside, scl
 
 
-def source_of(
+def _source_of(
     robot: Robot, methods: Sequence[TensionMethod], forward: bool, real: type[np.floating], stem: str
 ) -> tuple[str, str]:
     """Compose the C99 source and header of a robot, with numbers of type float64 or float32."""
@@ -138,7 +137,7 @@ def _kernels() -> dict[str, Any]:
 
 
 def _evaluated(bounds: dict[str, list[tuple[int, int, int]]], robot: Robot) -> dict[str, int]:
-    """Bounds of a kernel for `robot`. They are polynomials in the degrees of freedom and in the redundancy."""
+    """Bounds of a kernel for `robot`, from polynomials in the degrees of freedom and the redundancy."""
     n, r = robot.degrees_of_freedom, robot.cable_count - robot.degrees_of_freedom
     return {name: sum(value * n**i * r**j for i, j, value in terms) for name, terms in bounds.items()}
 
@@ -159,7 +158,7 @@ def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
 def _words(
     robot: Robot, methods: Sequence[TensionMethod], options: Sequence[Options], real: type[np.floating], stem: str
 ) -> dict[str, str]:
-    """Data and sizes that replace the placeholders in the text of the robot's functions."""
+    """Data and sizes for the placeholders in the text of the functions of a robot."""
     freedom, m, n = robot.freedom, robot.cable_count, robot.degrees_of_freedom
     turning = freedom[:, 3:].any(axis=1) if robot.motion_pattern in ROTATING else np.zeros(n, dtype=bool)
     rows = tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS
@@ -185,7 +184,7 @@ def _words(
         "statuses": _statuses(),
         "rows": str(rows),
         "results": str(rows * m),
-        "others": str(CABLE_ROWS * m + n * n + LAST_COLUMNS + tables.POSE_COLUMNS + FORWARD_NUMBERS),
+        "others": str(CABLE_ROWS * m + n * n + tables.LAST_COLUMNS + tables.POSE_COLUMNS + tables.FORWARD_NUMBERS),
         "cable_rows": str(CABLE_ROWS),
         "not_converged": str(codes.FORWARD_NOT_CONVERGED),
         "offset": str(FORWARD_STATUS),
@@ -210,7 +209,7 @@ def _rule(options: Options, real: type[np.floating]) -> str:
 
 
 def _statuses() -> str:
-    """Members of the enumeration of statuses in C, with their meanings."""
+    """Lines of the C enumeration of statuses: each status with its meaning."""
     rows = [(status.name, int(status), status.text) for status in PoseStatus if int(status) < BAD_INPUT]
     rows.append(("BAD_INPUT", BAD_INPUT, "a number is not finite, a length too short, a quaternion not of length 1"))
     forward = [(f"FORWARD_{each.name}", FORWARD_STATUS + int(each), each.text) for each in ForwardStatus]
@@ -219,7 +218,7 @@ def _statuses() -> str:
 
 
 def _constant(values: Array, name: str, real: type[np.floating]) -> str:
-    """Constant or list in braces as C text. C reads exactly the same numbers from this text."""
+    """C text of a constant, or of a list in braces. C reads exactly the same numbers from this text."""
     if values.ndim:
         separator = ", " if values.ndim == 1 else ",\n    "
         return f"{{{separator.join(_constant(value, name, real).strip('{}') for value in values)}}}"
@@ -239,7 +238,7 @@ def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
     """Write the SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits and program.
 
     The program accepts commands only from the controller that owns the group, and enforces the limits. Without
-    commands, it slows the winches down. Its header lists the settings of the CPU. It has not been compiled yet.
+    commands, the winches slow down. The header lists the settings of the CPU. The source has not been compiled yet.
 
     Args:
         robot: The robot used for planning; its winches need drum_radius and counts_per_turn.
@@ -257,14 +256,14 @@ def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
         >>> path = sl.export_scl(sl.load_robot("article-prototype"), "plc.scl")
     """
     instance(robot, Robot, "robot")
-    path = checked_name(file, ".scl", "an SCL source", "plc")
-    text = source_text(robot)
+    path = _checked_name(file, ".scl", "an SCL source", "plc")
+    text = _source_text(robot)
     with atomic_files(path.parent, [path.name]) as partials:
         partials[0].write_text(text, encoding="utf-8", newline="\r\n")
     return path
 
 
-def source_text(robot: Robot) -> str:
+def _source_text(robot: Robot) -> str:
     """Compose the SCL source of a robot; raise InvalidValueError if data of the winches are missing."""
     return filled("scl/sagline_plc.scl", {"stop": filled("scl/stop.scl", {}).rstrip(), **_scl_words(robot)})
 
@@ -303,7 +302,7 @@ def _scl_words(robot: Robot) -> dict[str, str]:
 
 
 def _block(block: Block) -> str:
-    """SCL text of a data block. The rows have the order of the block, for non-optimized access in TIA Portal."""
+    """SCL text of a data block. The rows keep the order of `block`, for non-optimized access in TIA Portal."""
     start = [f"   magic := 16#{block.magic:08X};"]
     if any(field.name == "version" for field in block.fields):
         start.append(f"   version := {LAYOUT};")
@@ -335,7 +334,7 @@ def _scl_number(value: float) -> str:
     return text if "." in text else text.replace("E", ".0E")
 
 
-def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
+def _checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
     """Check the path `file` of a source file; raise FileError if its suffix is not `ending`."""
     path = file_path(file)
     if path.suffix != ending:
@@ -354,6 +353,6 @@ def filled(source: str, words: dict[str, str]) -> str:
 
 
 def origin(robot: Robot) -> dict[str, str]:
-    """Replacements for the robot's name and the version of sagline. The name is made ASCII and cannot end a comment."""
+    """Replacements for robot name and version of sagline. The name is converted to ASCII and cannot end a comment."""
     name = "".join(x if x.isascii() and (x.isalnum() or x in " -_.,()") else "_" for x in robot.name)
     return {"name": name, "version": version("sagline")}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.cables.models import MODELS
+from sagline.cables.models import models_by_name
 from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Direction, Omission, Outlier
 from sagline.calibration.log import Sensors
 from sagline.calibration.parameters import KINDS, Parameters
@@ -18,19 +18,10 @@ from sagline.calibration.result import Calibration
 from sagline.core.arguments import choice, text
 from sagline.core.arrays import locked
 from sagline.core.errors import InvalidValueError
+from sagline.files import variables as v
 from sagline.files.netcdf import Format, choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import (
-    SOMEWHERE,
-    STEP,
-    Quantity,
-    check_indices,
-    check_variables,
-    fields_of,
-    record_variables,
-    records_of,
-    variables_of_result,
-)
+from sagline.files.variables import SOMEWHERE, STEP, Quantity
 from sagline.kernels.calibration.kinds import KIND_ROWS
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -78,7 +69,7 @@ FOUND: Final = (
     Quantity("chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
     Quantity("weight", N, "1", "weight of each pose, below 1 for an outlier", "weights", low=0.0),
 )
-SENSORS: Final = {  # name in the file: attribute and unit; the value is one number, or one per cable or axis
+SENSORS: Final = {  # name in the file: attribute and unit; a value is one number, or one per cable or axis
     "length_deviation": ("cable", "m"),
     "tension_deviation": ("cable", "N"),
     "position_deviation": ("axis", "m"),
@@ -137,20 +128,21 @@ DIRECTIONS: Final = {  # unobservable or weakly observable directions in paramet
 
 
 def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
-    """Refuse a data set that is not a calibration of these robots with these sensor quantities."""
+    """Refuse a data set that is not a calibration of `robot` and `before` with the sensor quantities `sensors`."""
     m = robot.cable_count
     if before.cable_count != m:
         raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)
     directions = [one for columns in DIRECTIONS.values() for one in columns]
     quantities = [*FOUND, *PARAMETERS, *PLACED, *sensors, *OUTLIERS, *LEFT_OUT, *directions]
-    for group in (CROSS_VALIDATION, CRITICISMS):  # older files do not have the second
+    for group in (CROSS_VALIDATION, CRITICISMS):  # older files do not have the second variable
         if any(one.name in data.variables for one in group):
             quantities += group
     sizes = {str(name): size for name, size in data.sizes.items()}
-    fixed = {"cable": m, "reading": 2 * m + 6, "kind_row": KIND_ROWS, "other_parameter": sizes.get("parameter", 0)}
-    check_variables(data, quantities, sizes | fixed)
+    kind_rows = max(KIND_ROWS - 2, min(sizes.get("kind_row", 0), KIND_ROWS))  # older files do not have the last kinds
+    fixed = {"cable": m, "reading": 2 * m + 6, "kind_row": kind_rows, "other_parameter": sizes.get("parameter", 0)}
+    v.check_variables(data, quantities, sizes | fixed)
     ranges = {"parameter_cable": (-1, m), "parameter_place": (-1, sizes["parameter"]), "outlier_cable": (-1, m)}
-    check_indices(data, ranges | dict.fromkeys(("row", "outlier_row", "left_out_row"), (0, sys.maxsize)))
+    v.check_indices(data, ranges | dict.fromkeys(("row", "outlier_row", "left_out_row"), (0, sys.maxsize)))
     words: dict[str, Iterable[str]] = {
         "parameter_name": KINDS,
         "parameter_unit": UNITS,
@@ -180,8 +172,8 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
         The calibration.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a calibration, or of a newer format. If it
-            was changed after it was written; digest, shapes, units and indices are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a calibration, or of a newer format. If the
+            file was changed after it was written: digest, shapes, units and indices are checked.
 
     Examples:
         >>> import numpy as np
@@ -204,16 +196,17 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
 
 def _pack(found: Calibration) -> Dataset:
     """Create the data set of a calibration."""
-    variables = variables_of_result(found, FOUND) | variables_of_result(found.parameters, PARAMETERS)
+    variables = v.variables_of_result(found, FOUND) | v.variables_of_result(found.parameters, PARAMETERS)
     dimensions, units, attributes = variables["parameter_unit"]
     variables["parameter_unit"] = dimensions, np.where(units == "", "1", units).astype(object), attributes
     deviations = {name: getattr(found.sensors, name) for name in SENSORS}
     sensors = [_sensor(name, np.ndim(value)) for name, value in deviations.items() if value is not None]
-    variables |= variables_of_result(found.sensors, (*PLACED, *sensors)) | record_variables(found.outliers, OUTLIERS)
+    variables |= v.variables_of_result(found.sensors, (*PLACED, *sensors))
+    variables |= v.record_variables(found.outliers, OUTLIERS)
     for group, columns in DIRECTIONS.items():
-        variables |= record_variables(getattr(found, group), columns, len(found.values))
-    variables |= variables_of_result(found.cross_validation, CROSS_VALIDATION)
-    variables |= record_variables(found.criticisms, CRITICISMS)
+        variables |= v.record_variables(getattr(found, group), columns, len(found.values))
+    variables |= v.variables_of_result(found.cross_validation, CROSS_VALIDATION)
+    variables |= v.record_variables(found.criticisms, CRITICISMS)
     omitted = np.array([(row, reason) for reason, rows in found.left_out.items() for row in rows], dtype=np.int64)
     for one, values in zip(LEFT_OUT, omitted.reshape(-1, 2).T, strict=True):
         variables[one.name] = one.parts, values.astype(one.type), one.attributes
@@ -222,7 +215,7 @@ def _pack(found: Calibration) -> Dataset:
         "read": READ[found.parameters.counted],
         "date": found.date,
         "left_out": " ".join(reason.name.lower() for reason in found.left_out),
-        **choice_attributes("model", found.model, MODELS),
+        **choice_attributes("model", found.model, models_by_name()),
         "robot_before": dump_robot(found.before),
     }
     return FORMAT.dataset(f"Calibration of {found.robot.name}", found.robot, attributes, variables)
@@ -232,25 +225,28 @@ def _sensor(name: str, axes: int) -> Quantity:
     """Read the standard deviation of a sensor: one number, or one per cable or axis."""
     part, unit = SENSORS[name]
     long_name = f"standard deviation of a {name.removesuffix('_deviation')} that is read"
-    return Quantity(name, (part,) if axes else (), unit, long_name, low=0.0)
+    infinite = name == "rotation_deviation"  # `Sensors` allows an unmeasured yaw only
+    return Quantity(name, (part,) if axes else (), unit, long_name, low=0.0, infinite=infinite)
 
 
 def _unpack(path: Path, data: Dataset) -> Calibration:
     """Create the calibration from a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
-    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # this group always exists
+    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # this one always exists
     sensors = [_sensor(name, data.variables[name].ndim) for name in dict.fromkeys(measured)]
     _check_calibration(data, robot, before, sensors)
-    found, numbers, placed = (fields_of(data, each) for each in (FOUND, PARAMETERS, (*PLACED, *sensors)))
+    found, numbers, placed = (v.fields_of(data, each) for each in (FOUND, PARAMETERS, (*PLACED, *sensors)))
     found |= {one.place: data[one.name].values.item() for one in FOUND if not one.parts}
+    missing = ((0, KIND_ROWS - len(numbers["where"])), (0, 0))
+    numbers["where"] = locked(np.pad(numbers["where"], missing, constant_values=-1))
     texts: dict[str, Any] = {name: tuple(numbers.pop(name).tolist()) for name in ("names", "labels", "units")}
     texts["units"] = tuple("" if unit == "1" else unit for unit in texts["units"])
     omissions = [Omission[name.upper()] for name in data.attrs["left_out"].split()]
     rows, reasons = (data[one.name].values for one in LEFT_OUT)
     checked = {one.place: data[one.name].values.item() for one in CROSS_VALIDATION if "folds" in data.variables}
     directions: dict[str, Any] = {
-        name: tuple(Direction(**row) for row in records_of(data, columns)) for name, columns in DIRECTIONS.items()
+        name: tuple(Direction(**row) for row in v.records_of(data, columns)) for name, columns in DIRECTIONS.items()
     }
     return Calibration(
         robot=robot,
@@ -259,13 +255,13 @@ def _unpack(path: Path, data: Dataset) -> Calibration:
         parameters=Parameters(**numbers, **texts, counted=READ.index(data.attrs["read"]) == 1),
         **found | {"status": CalibrationStatus(found["status"]), "poses": Pose._adopt(**found["poses"])},
         left_out={reason: locked(rows[reasons == reason.value]) for reason in omissions},
-        outliers=tuple(Outlier(**row) for row in records_of(data, OUTLIERS)),
+        outliers=tuple(Outlier(**row) for row in v.records_of(data, OUTLIERS)),
         criticisms=tuple(
-            Criticism(**row) for row in records_of(data, CRITICISMS if CRITICISMS[0].name in data.variables else ())
+            Criticism(**row) for row in v.records_of(data, CRITICISMS if CRITICISMS[0].name in data.variables else ())
         ),
         cross_validation=CrossValidation(**checked) if checked else None,
         **directions,
-        model=choice_of(path, data.attrs, "model", MODELS),
+        model=choice_of(path, data.attrs, "model", models_by_name()),
         log=str(data.attrs["log"]),
         date=str(data.attrs["date"]),
     )

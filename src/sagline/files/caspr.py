@@ -42,22 +42,22 @@ _JOINTS: Final[dict[str, tuple[MotionPattern, _Vector | None]]] = {
 def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cable_set: str | None = None) -> Imported:
     """Read a CASPR robot with one platform.
 
-    Cables in CASPR have no weight, and ideal cables do not stretch. Without the argument `cables`, missing values are
-    replaced by values of a 4 mm steel rope; the robot's `assumed` lists these values. Only pulleys with a vertical
-    swivel axis are read.
+    Cables in CASPR have no weight, and ideal cables do not stretch. If `cables` is None, missing values are replaced by
+    values of a 4 mm steel rope. The robot's `assumed` lists the replaced values. Only pulleys with a vertical swivel
+    axis are read.
 
     Args:
-        source: The robot's folder, or its file of bodies or of cables; the other file is then searched in the same
-            folder.
-        cables: Material of the cables. None: values of the file, and assumed values for missing values.
+        source: The robot's folder, or one of its two files (bodies or cables). If only one file is named, the other is
+            searched in the same folder.
+        cables: Material of the cables. None: the values of the file, with assumed values for missing values.
         cable_set: Name of the set of cables; None for the default of the file.
 
     Returns:
         Imported: the robot, and the lost data.
 
     Raises:
-        FileError: If a file cannot be read or is missing, or if the robot does not have a single platform and cables
-            that go straight from the base to the platform.
+        FileError: If a file is missing or cannot be read. If the robot has several platforms, or cables that do not go
+            straight from base to platform.
 
     Examples:
         >>> import sagline as sl
@@ -89,7 +89,7 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
 
 
 def _files(source: Path) -> tuple[Path, Path]:
-    """Paths of the files of bodies and of cables. A file that the caller names has priority over other files."""
+    """Paths of the files of bodies and of cables. If `source` is a file, other files of its kind are ignored."""
     if not exists(source):
         raise FileError(source, "does not exist", "Check its name.")
     folder = source if source.is_dir() else source.parent
@@ -119,7 +119,7 @@ def _kind(root: Element) -> str | None:
 
 
 def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
-    """Fields of the robot from the file of bodies, and the lost data of this file."""
+    """Fields of the robot from the file of bodies, and the data of this file that the robot cannot contain."""
     links = root.findall(".//link_rigid")
     if len(links) != 1:
         raise InvalidValueError("number of <link_rigid>", len(links), "1", "sagline supports a single platform.")
@@ -138,7 +138,7 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
 
 
 def _inertia(element: Element, mass: float, center: Array) -> Array:
-    """Inertia about the center of mass. CASPR gives the inertia about this center or the joint (platform origin)."""
+    """Inertia about the center of mass. CASPR may give the inertia about the joint (platform origin)."""
     xx, yy, zz, xy, xz, yz = (
         xml.number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
     )
@@ -182,7 +182,7 @@ def _select_set(root: Element, wanted: str | None, lost: list[str]) -> Element:
 
 
 def _columns(chosen: Element, center: Array, lost: list[str]) -> dict[str, Any]:
-    """Values of all cables of a set, by the name of the quantity."""
+    """Values of all cables of the set `chosen`: one list per quantity."""
     rows = []
     for k, element in enumerate(chosen):
         item = f"{element.tag} {element.get('name') or k}"

@@ -1,4 +1,4 @@
-"""Executions: reading from MCAP logs, and writing with the plan to MCAP or NetCDF."""
+"""Executions: reading from MCAP logs, and writing to MCAP or NetCDF together with the plan."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ PLAN_GROUP: Final = "plan"
 
 
 def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Execution:
-    """Read an execution from an MCAP log. The log may contain a whole session, or end early (process killed).
+    """Read an execution from an MCAP log. The log may contain a whole session, or be cut off by the end of its process.
 
     All numbers of a file that `Execution.save` wrote are restored exactly.
 
     Args:
         file: The log.
-        plan: Index of the plan, from 0; -1 is the last plan. None: all cycles of the log; the execution then has a plan
+        plan: Index of the plan, from 0; -1 is the last plan. None: all cycles of the log. The execution then has a plan
             only if the log has exactly one plan.
 
     Returns:
-        The execution. Its status is UNKNOWN if the log does not contain the end of the plan.
+        The execution. The status is UNKNOWN if the log does not contain the end of the plan.
 
     Raises:
-        FileError: If the file is missing, not a log, or of a newer format. If it is damaged, or cut off before its
-            first cycle. If a package is missing.
+        FileError: If the file is missing, not a log, or of a newer format. If the log is damaged, or cut off before its
+            first cycle. If a package that reads logs is missing.
         InvalidValueError: If the log does not have this plan.
 
     Warns:
@@ -62,10 +62,10 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
     if not log.complete:
         text = f"{log.path} was cut off: the data of its last second are missing."
         warnings.warn(text, SaglineWarning, stacklevel=2)
-    return execution_of_log(log, plan)
+    return _execution_of_log(log, plan)
 
 
-def execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
+def _execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
     """Create the execution from the content of a log."""
     count = len(log.plans)
     chosen = None if plan is None else integer(plan)
@@ -158,7 +158,7 @@ def save(execution: Execution, file: os.PathLike[str] | str) -> None:
     match path.suffix.lower():
         case ".mcap":
             save_execution(execution, path)
-        case ".nc":  # the plan is the group `plan`
+        case ".nc":  # the plan is stored in the group `plan`
             plan = instance(execution, Execution, "execution").plan
             write_dataset(pack(execution), path, {} if plan is None else {PLAN_GROUP: plan_dataset(plan)})
         case _:
@@ -184,7 +184,7 @@ def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Value for the table of events: a number or a text without change; a state as its name."""
+    """Value for the table of events: the name of a state; numbers and texts without change."""
     return value.name if isinstance(value, State) else str(value) if isinstance(value, str) else value
 
 

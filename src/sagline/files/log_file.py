@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import nullcontext
 from difflib import get_close_matches
 from pathlib import Path
@@ -15,14 +15,15 @@ import numpy as np
 from sagline.calibration.log import Sensors, WinchLog
 from sagline.core.arguments import file_path, instance, optional
 from sagline.core.arrays import Array, locked
-from sagline.core.errors import FileError
+from sagline.core.errors import FileError, nearest
+from sagline.files.log_columns import ARRAYS, ColumnEntry, log_text
 from sagline.files.path_file import EULER, QUATERNION
-from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
+from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, column_of_cable, line_error, separator_of
 from sagline.files.writing import write_text
-from sagline.files.yaml_text import YamlEntry, parse_mapping, validate
+from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
 from sagline.robot.pose import Pose
 
 DEVIATIONS: Final = {
@@ -33,12 +34,14 @@ DEVIATIONS: Final = {
 }
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
-_NEAR: Final = 0.7  # words with this similarity to a key are misspelt keys; "name" and "frame" are less similar
+_NEAR: Final = 0.7  # a word that is this similar to a key is a misspelt key; "name" and "frame" are less similar
 XYZ: Final = ("x", "y", "z")
 COMMANDED: Final = "_commanded"
 _MOST: Final = 1000  # largest number of cables
-_OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # column of each cable and its unit
-_NUMBERED = re.compile(rf"(count|length)_([0-9]{{1,{len(str(_MOST))}}})")
+_OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # columns that exist once per cable, and their units
+_NUMBERED = re.compile(rf"(count|length|load_cell)_([0-9]{{1,{len(str(_MOST))}}})")
+_POSE_COLUMNS: Final = (*XYZ, *EULER, *QUATERNION)
+_MAPPED: Final = ("time", *_OF_CABLE, "position", "quaternion", "cable", "pose")  # other keys of a map of columns
 USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # standard deviations of the sensors
 
 
@@ -52,29 +55,38 @@ class _Sensors(YamlEntry):
     frame: PoseEntry | None = None
     target: Any = None
 
+    def sensors(self, path: Path) -> Sensors:
+        """Sensors that the keys describe; the path of the file is used in messages."""
+        with value_errors(path):
+            values: dict[str, Any] = {
+                name: in_si(value, unit, name)
+                for name, unit in (DEVIATIONS | {"target": "m"}).items()
+                if (value := getattr(self, name)) is not None
+            }
+            if self.frame is not None:
+                values["frame"] = self.frame.pose("frame")
+            return Sensors(**values)
 
-def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
-    """Separate the comments above the header: sensors, and the rest of the text."""
+
+class _LogMap(_Sensors):
+    """Keys of a map of columns."""
+
+    columns: dict[str, ColumnEntry]
+
+
+def _sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
+    """Sensors from the comments above the header, and the text without these comments."""
     lines = text.split("\n")
     count = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
     rows = "\n".join([""] * count + lines[count:])
     if not any(said):
         return Sensors(), rows
-    entry = validate(parse_mapping("\n".join(said), path), _Sensors, path)
-    with value_errors(path):
-        values: dict[str, Any] = {
-            name: in_si(value, unit, name)
-            for name, unit in (DEVIATIONS | {"target": "m"}).items()
-            if (value := getattr(entry, name)) is not None
-        }
-        if entry.frame is not None:
-            values["frame"] = pose_of_entry(entry.frame, "frame")
-        return Sensors(**values), rows
+    return validate(parse_mapping("\n".join(said), path), _Sensors, path).sensors(path), rows
 
 
 def _key_line(line: str) -> str:
-    """YAML line of a comment whose first word is or resembles a sensor key; an empty line for any other comment."""
+    """YAML line of a comment if its first word is or resembles a sensor key; otherwise an empty line."""
     found = _COMMENT.fullmatch(line)
     if found is None:
         return ""
@@ -84,11 +96,11 @@ def _key_line(line: str) -> str:
 
 
 def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
-    """Comments that describe sensors; `sensors_of_comments` restores the same sensors."""
+    """Comments that describe sensors; `_sensors_of_comments` restores the same sensors."""
     for name, unit in DEVIATIONS.items():
         value: Array | None = getattr(sensors, name)
         if value is not None:
-            numbers = [f"{number!r} {unit}" for number in np.atleast_1d(value).tolist()]
+            numbers = [f"{x!r} {unit}" if np.isfinite(x) else "inf" for x in np.atleast_1d(value).tolist()]
             listed = f"[{', '.join(numbers)}]" if value.ndim else numbers[0]
             yield f"# {name}: {listed}"
     position, quaternion = sensors.frame.position.tolist(), sensors.frame.quaternion.tolist()
@@ -103,7 +115,8 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     header = next((line for line in text.split("\n") if line.strip()), "")
     cells = [cell.partition("[")[0].strip() for cell in header.replace('"', "").split(separator_of(text))]
     found = [_NUMBERED.fullmatch(column_of_cable(cell)) for cell in cells]
-    cables = max((min(int(match[2]), _MOST - 1) + 1 for match in found if match), default=1)
+    lengths = [match for match in found if match and match[1] != "load_cell"]
+    cables = max((min(int(match[2]), _MOST - 1) + 1 for match in lengths), default=1)
     optional_units = {f"load_cell_{k}": "N" for k in range(cables)}
     optional_units |= dict.fromkeys(XYZ, "m") | dict.fromkeys(EULER, "rad") | dict.fromkeys(QUATERNION, "")
     readings = {f"{kind}_{k}": _OF_CABLE[kind] for kind in ("count", "length") for k in range(cables)}
@@ -128,9 +141,6 @@ def _names(kind: str, cables: int) -> list[str]:
 def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
     """Fields of the log, without its sensors."""
     columns = table.columns
-    for name in _names("length", cables):
-        if name in columns:
-            table.refuse(columns[name] < 0.0, name, columns[name], "m", ">= 0 m")
     position = _stack_columns(table, XYZ, all_of_them=False)
     return {
         "counts": _stack_columns(table, _names("count", cables)),
@@ -144,7 +154,7 @@ def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
 
 
 def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
-    """Matrix of the columns `names`. A missing column is NaN. If all columns are missing: None."""
+    """Matrix of the columns `names`, with NaN for a missing column. None if all columns are missing."""
     names = list(names)
     found = [name for name in names if name in table.columns]
     if not found:
@@ -155,9 +165,15 @@ def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool =
     return locked(np.stack([table.columns.get(name, none) for name in names], axis=-1))
 
 
+def _is_without_yaw(table: CsvTable) -> bool:
+    """True if the measured rotations are roll and pitch only, as those of an inclinometer."""
+    return EULER[0] not in table.columns and all(name in table.columns for name in EULER[1:])
+
+
 def _rotation(table: CsvTable, suffix: str) -> Array | None:
     """Rotations as unit quaternions; a row of NaN where the rotation is not measured."""
-    angles = _stack_columns(table, [name + suffix for name in EULER])
+    euler = EULER[1:] if not suffix and _is_without_yaw(table) else EULER
+    angles = _stack_columns(table, [name + suffix for name in euler])
     quaternion = _stack_columns(table, [name + suffix for name in QUATERNION])
     if angles is not None and quaternion is not None:
         way = f"columns alpha{suffix} beside qx{suffix}; allowed: one way"
@@ -167,12 +183,13 @@ def _rotation(table: CsvTable, suffix: str) -> Array | None:
         return None
     missing = np.isnan(given)
     part = missing.any(axis=1) & ~missing.all(axis=1)
-    names = ", ".join(name + suffix for name in (EULER if quaternion is None else QUATERNION))
+    names = ", ".join(name + suffix for name in (euler if quaternion is None else QUATERNION))
     table.refuse(np.asarray(part), f"one of {names}", np.full(len(given), np.nan), "", "all of them, or blanks in all")
     known = ~missing.all(axis=1)
     found = np.full((len(given), 4), np.nan)
     if quaternion is None:
-        found[known] = Pose.from_euler(np.zeros(3), *given[known].T).quaternion
+        yaw = [0.0] * (len(EULER) - len(euler))
+        found[known] = Pose.from_euler(np.zeros(3), *yaw, *given[known].T).quaternion
         return found
     length = np.linalg.norm(np.where(missing, 0.5, given), axis=1)
     wrong = np.abs(length - 1.0) > QUATERNION_TOLERANCE
@@ -193,7 +210,9 @@ def _commanded(table: CsvTable) -> Pose | None:
     return Pose.from_quaternion(position, rotation)
 
 
-def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> WinchLog:
+def load_log(
+    file: os.PathLike[str] | str, sensors: Sensors | None = None, columns: os.PathLike[str] | str | None = None
+) -> WinchLog:
     """Read a log: readings of encoders, load cells and, optionally, a measuring system, with the robot at rest.
 
     The CSV file has a header with the names of the columns, in any order, and one row per pose:
@@ -205,12 +224,13 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         0,320530,312004,299911,0.41,0.52,0.39,1012.5,998.1,2003.0
         30,318112,311870,301442,0.44,0.50,0.41,,,
 
-    - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: lengths off the drums, as the controller reports
-    them. `C0` and `L0` are other names of `count_0` and `length_0`.
+    - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: lengths off the drums, in the controller's own
+    values. `C0` and `L0` are other names of `count_0` and `length_0`.
     - `load_cell_0`, ...: tensions at the frame ends; cables without a load cell have no column.
-    - `x`, `y`, `z`, all or some: position of the target in the axes of the measuring system.
+    - `x`, `y`, `z` (or some of them): position of the target in the axes of the measuring system.
     - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): rotation of the
-      platform in these axes.
+      platform in these axes. `beta` and `gamma` without `alpha` are pitch and roll, as an inclinometer measures them;
+      they refer to the vertical, and the standard deviation of the yaw is then infinite.
     - `x_commanded`, `y_commanded`, `z_commanded`, and optionally `qx_commanded`, ... or `alpha_commanded`, ...: the
       commanded pose; without a rotation the platform is level.
     - `time`: time of the row.
@@ -220,11 +240,26 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
     commanded poses must not be blank. Comments above the header give the standard deviations of the sensors (one
     number, or one per cable or axis), the pose of the measuring system, `# frame: {position: [1, 0, 0.5], euler:
     {alpha: 90 deg}}`, and the target, `# target: [0, 0, 0.1]`. The keys are fields of `Sensors`.
-    Quaternions have length 1 within 1e-3 (rounding of printed decimals), and are normalized.
+    The length of a quaternion may differ from 1 by 1e-3, because decimals are rounded; quaternions are normalized.
+
+    The arrays of an `.npz` or `.mat` file have the same names; `length`, `count`, `load_cell`, `position` and
+    `quaternion` are matrices with one row per pose. A map of columns, a YAML file, reads files with other names:
+
+        columns:
+          time: {name: t, unit: ms}
+          length: {name: "enc{}", unit: mm, scale: -1, cables: [3, 1, 2]}  # columns enc3, enc1 and enc2
+          load_cell_0: force
+          position: {name: mocap, unit: mm}  # matrix with the columns x, y, z
+        tension_deviation: 5 N
+
+    `scale` is the factor of the values in the file, and `cables` are the numbers of the robot's cables in the file. In
+    a table with one row per cable, the keys `cable` and `pose` (or `time`) are the columns with these numbers. The map
+    can contain the keys of the comments. Other columns are not read.
 
     Args:
         file: The file.
         sensors: Sensors that replace the sensors in the file.
+        columns: YAML file with a map of columns; None for a file with the names above.
 
     Returns:
         The log; its source is the name of the file.
@@ -241,28 +276,57 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         >>> print(sl.load_log("two.csv"))
         2 rows of 2 cables: counts; two.csv
     """
-    path = file_path(file)
     optional(sensors, Sensors, "sensors")
-    text = read_text(path, TABLE_LIMIT)
-    said, rows = sensors_of_comments(text, path)
-    given = said if sensors is None else sensors
-    fields = _fields(*_read(path, rows))
+    return read_log(file, sensors, columns, {})
+
+
+def read_log(
+    file: os.PathLike[str] | str,
+    sensors: Sensors | None,
+    columns: os.PathLike[str] | str | None,
+    deviations: Mapping[str, float],
+) -> WinchLog:
+    """Read a log; `deviations` replace standard deviations of `sensors` or of the sensors in the file."""
+    path = file_path(file)
+    chosen, said = None, None
+    if columns is not None:
+        chosen, said = _map_of_columns(file_path(columns, "columns"))
+    converted = chosen is not None or path.suffix.lower() in ARRAYS
+    commented, rows = _sensors_of_comments(log_text(path, chosen) if converted else read_text(path, TABLE_LIMIT), path)
+    given = sensors or said or commented
+    given = given.replace(**deviations) if deviations else given
+    table, cables = _read(path, rows)
+    fields = _fields(table, cables)
     for name, key in (("load_cells", "tension"), ("position", "position"), ("rotation", "rotation")):
         if fields[name] is not None and getattr(given, f"{key}_deviation") is None:
             wish = f"# {key}_deviation: {USUAL[key]}"
             step = f"Write a comment above the columns, for instance '{wish}', or give sensors (--{key}-deviation)."
             reason = f"does not give the {key}_deviation of a sensor with readings"
             raise FileError(path, reason, step, item=f"{key}_deviation")
-    with value_errors(path) if sensors is None else nullcontext():  # `sensors` may be the cause of an error
+    if _is_without_yaw(table):
+        given = given.replace(rotation_deviation=given.rotation_deviation * np.array([1.0, 1.0, np.inf]))
+    with value_errors(path) if sensors is None else nullcontext():  # `sensors` may also cause an error
         return WinchLog(**fields, sensors=given, source=str(path))
+
+
+def _map_of_columns(path: Path) -> tuple[dict[str, ColumnEntry], Sensors | None]:
+    """Map of columns in a YAML file, and the sensors; None without a key of the sensors."""
+    entry = validate(parse_mapping(read_text(path, YAML_LIMIT), path), _LogMap, path)
+    for key in entry.columns:
+        if not (_NUMBERED.fullmatch(key) or key in _MAPPED or key.removesuffix(COMMANDED) in _POSE_COLUMNS):
+            near = nearest(key, (*_MAPPED, *_POSE_COLUMNS))
+            step = f"Did you mean {near}?" if near else "Remove it."
+            reason = f"columns.{key} is an unknown key; allowed: {', '.join((*_MAPPED, *_POSE_COLUMNS))}"
+            raise FileError(path, reason, step, item=f"columns.{key}")
+    return entry.columns, entry.sensors(path) if entry.model_fields_set - {"columns"} else None
 
 
 def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
     """Write a log to a CSV file atomically; `load_log` restores all numbers exactly."""
-    write_text(file_path(file), dump_log(log))
+    write_text(file_path(file), _dump_log(log))
 
 
-def dump_log(log: WinchLog) -> str:
+def _dump_log(log: WinchLog) -> str:
     """CSV text of a log, in SI units, with the sensors in comments."""
     table = instance(log, WinchLog, "log").table()
     lines = [*_comments_of_sensors(log.sensors), ",".join(table.head)]

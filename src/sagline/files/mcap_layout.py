@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ROWS: Final = "time"
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
 WORLD, PLATFORM = "world", "platform"
-FINE, COARSE = 2.0**20, 2.0**10  # [1/m], steps of drawn coordinates, whose bytes are then mostly zero
+FINE, COARSE = 2.0**20, 2.0**10  # number of steps per meter of drawn coordinates, so that most of their bytes are zero
 POINTS: Final = 7  # number of points per cable
 _THICKNESS: Final = 3.0  # line width [px]
 _STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # color: red, green, blue, 0 to 1
@@ -98,11 +98,11 @@ def columns_of(execution: Execution) -> dict[str, NDArray[Any]]:
 
 
 NANO: Final = 1e9  # ticks of the log's clock per second [1/s]
-FORMAT: Final = 1  # incremented with every change that an older sagline could misread
+FORMAT: Final = 1  # incremented with every change that an older version of sagline could misread
 SOURCE: Final = f"sagline {version('sagline')}"
 CYCLE, RECORD, EVENT, TF, SCENE, TRUTH = "/cycle", "/record", "/event", "/tf", "/scene", "/truth"
 HEAD: Final = "sagline.json"  # attachment: format, period, robot
-PLAN: Final = "plan-{}.sagline"  # attachment: a packed data set
+PLAN: Final = "plan-{}.sagline"  # attachment: plan as a packed data set
 END: Final = "plan-{}-end.json"  # attachment: status and reason
 PACKED: Final = "application/x-sagline-columns"
 JSON: Final = "application/json"
@@ -118,7 +118,7 @@ def _list(description: str) -> dict[str, Any]:
     return {"type": "array", "items": {"type": "number"}, "description": description}
 
 
-# Number of decimals and JSON schema of the quantities of the topic `/cycle`, which are rounded for human readers. The
+# Number of decimals and JSON schema of the quantities of the topic `/cycle`. They are rounded for human readers. The
 # topic `/record` contains all digits.
 CYCLE_FIELDS: Final = {
     "time": (2, _number("time on the clock of the link [s]")),
@@ -137,7 +137,8 @@ def _schema(title: str, **properties: Any) -> bytes:
 
 
 _TEXT: Final = {"type": "string"}
-# Foxglove reads no schema with two types for a value. Lists with missing numbers are therefore lists of objects.
+# Foxglove cannot read a schema that allows two types for a value. A list with missing numbers is therefore written as a
+# list of objects.
 PARTIAL: Final = "partial"
 _PARTIAL: Final = {
     "type": "array",
@@ -168,12 +169,12 @@ SCHEMAS: Final = {
 
 
 def head_of(robot: str, period: float) -> bytes:
-    """Attachment of a log with the cycle period [s] and the robot, as the text of its file."""
+    """Attachment at the start of a log: cycle period [s], and the robot as the text of its file."""
     return json.dumps({"sagline_log_format": FORMAT, "source": SOURCE, "period": period, "robot": robot}).encode()
 
 
 def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
-    """Messages of N cycles for other programs, with rounded numbers."""
+    """Messages of N cycles for other programs. Their numbers are rounded."""
     away = PER_METER * (columns["set_length"] - columns["length"] - columns["zero"])
     there = {**columns, "length_error": away, "correction": PER_METER * columns["correction"]}
     kept = {"state": [State(code).name for code in columns["state"].tolist()]}
@@ -208,7 +209,7 @@ def truth_text(time: float, position: Any, quaternion: Any) -> bytes:
 
 
 def _json_values(values: NDArray[Any]) -> list[Any]:
-    """Convert values for JSON. Numbers that are not finite, and rows without finite numbers, become None."""
+    """Convert values for JSON. A number that is not finite becomes None, and so does a row without finite numbers."""
     known = np.isfinite(values)
     if known.all():
         return list(values.tolist())
@@ -221,7 +222,7 @@ def _text(said: dict[str, Any]) -> bytes:
 
 
 def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
-    """Pose of the platform at `stamp` [ns], as a message of Foxglove; `position` [m], `quaternion` scalar last."""
+    """Foxglove message with the pose of the platform at `stamp` [ns]; `position` [m], `quaternion` scalar last."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
     found = FrameTransform(parent_frame_id=WORLD, child_frame_id=PLATFORM)
@@ -261,7 +262,7 @@ class Scene:
         chord = np.linalg.norm(run[:, 0], axis=1)
         span = np.hypot(run[:, 0, 0], run[:, 0, 1])
         weight = robot.cables.linear_density * robot.gravity  # weight per length [N/m]
-        deep = 0.5 * weight * span * chord / np.maximum(tension, weight * chord)  # m, times share (1 - share)
+        deep = 0.5 * weight * span * chord / np.maximum(tension, weight * chord)  # [m], four times the sag
         points[:, :, 2] -= np.where(np.isfinite(deep), deep, 0.0)[:, None] * (share * (1.0 - share))[:, 0]
         return points
 
@@ -280,7 +281,7 @@ def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[
 
 
 def _corners(points: Array) -> Array:
-    """Lines between pairs of points, (e, 2, 3), for pairs without a third point that is closer to both points."""
+    """Lines (e, 2, 3) between pairs of points. A pair is skipped if a third point is closer to both points."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = [
         (i, j)

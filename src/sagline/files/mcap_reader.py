@@ -29,12 +29,12 @@ from sagline.robot.robot import Robot
 
 MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 AGAIN: Final = "Get the original file."
-_HEAD: Final = 9  # number of bytes in front of the content of a record, for its type and length
+_HEAD: Final = 9  # number of bytes before the content of a record: its type and its length
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
 _NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # columns required in every chunk
 _INFLATION: Final = 100  # largest ratio of uncompressed to compressed size of a chunk; usual ratios are 1.5 to 10
 _SMALL: Final = 1 << 16  # a chunk of this size [bytes] is always allowed
-_LARGEST: Final = 1 << 24  # largest size of the packed cycles of a chunk [bytes]; a usual size is a hundredth of it
+_LARGEST: Final = 1 << 24  # largest size of the packed cycles of a chunk [bytes]; the usual size is a hundredth
 _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")  # channel, sequence number, two times
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
@@ -57,7 +57,7 @@ class RecordedLog:
     robot: Robot | None = None  # the robot; None until it has been read
     period: float = 0.0  # period of a cycle [s]
     plans: list[bytes] = field(default_factory=list)  # the plans, packed
-    # end of each plan, by its index; -1: no plan: name of its `ExecutionStatus`, and the reason in one line
+    # end of each plan by the plan's index (-1: no plan): name of its `ExecutionStatus`, and the reason in one line
     endings: dict[int, tuple[str, str]] = field(default_factory=dict)
     blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, for each chunk
     events: list[Event] = field(default_factory=list)  # events in order
@@ -74,7 +74,7 @@ class LogReader:
     """
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
-        """Store the path of the file; the method `more` reads the file."""
+        """Store the path of the file. The method `more` reads the file."""
         self.log = RecordedLog(file_path(file))
         check_packages()
         self._offset = self._digest = 0
@@ -90,7 +90,7 @@ class LogReader:
                 self._take(code, record)
         except (FileError, MemoryError):
             raise
-        except Exception as error:  # any error, because the libraries have no common error for damaged files
+        except Exception as error:  # any error is caught, because the libraries have no common error for damaged files
             raise self._damaged() from error
         torn = self._offset - before < len(data) and not self.log.complete
         if torn and data.endswith(MAGIC) and len(data) > len(MAGIC):
@@ -118,7 +118,7 @@ class LogReader:
     def _check_kind(self, data: bytes) -> None:
         if data[: len(MAGIC)] == MAGIC:
             return
-        if MAGIC.startswith(data):  # the file has at most the first few bytes
+        if MAGIC.startswith(data):  # the file contains at most the first few bytes
             raise FileError(self.log.path, "is empty", "It contains no data, or it was cut off at its start.")
         step = "Give a recorded .mcap file, or one of Execution.save."
         raise FileError(self.log.path, "is not a log in MCAP", step)
@@ -217,7 +217,7 @@ class LogReader:
 
 
 def _content_of(chunk: Any) -> bytes:
-    """Uncompress the records of a chunk; raise ValueError if they are too large for the compressed size."""
+    """Uncompress the records of a chunk. Raise ValueError if the records are too large for the compressed size."""
     from lz4.frame import LZ4FrameDecompressor
     from zstandard import ZstdDecompressor, get_frame_parameters
 
@@ -225,7 +225,7 @@ def _content_of(chunk: Any) -> bytes:
     if said > _INFLATION * len(data) + _SMALL:
         raise ValueError("a chunk with a stated size that its bytes do not allow")
     if chunk.compression == "zstd":
-        if get_frame_parameters(data).content_size != said:  # the libraries allocate this size first
+        if get_frame_parameters(data).content_size != said:  # the libraries first allocate this size
             raise ValueError("a chunk with two sizes")
         data = ZstdDecompressor().decompress(data, allow_extra_data=False)
     elif chunk.compression == "lz4":
@@ -250,7 +250,7 @@ def read_log(file: os.PathLike[str] | str) -> RecordedLog:
 
 
 def has_begun(file: os.PathLike[str] | str) -> bool:
-    """True if the log of another process can be read, which requires the file and its first bytes."""
+    """True if the log that another process writes can be read: the file exists and has its first bytes."""
     try:
         path = file_path(file)
         check_regular(path, path.stat().st_mode)

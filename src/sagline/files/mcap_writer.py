@@ -1,8 +1,8 @@
 """Writing of MCAP logs, chunk by chunk. If the process is killed, all complete chunks can be read.
 
 The topic `/record` contains all numbers; it has one message per chunk with the packed values of its cycles. Attachments
-contain the robot and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and
-`/scene` in the schemas of Foxglove.
+contain the robot and the plans. All topics except `/record` are for other programs: `/cycle` and `/event` in JSON,
+`/tf` and `/scene` in the schemas of Foxglove.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 
 PACKAGES: Final = ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "zstandard")
-_UNLIMITED: Final = 1 << 40  # [bytes], so large that a chunk never ends because of its size
-CHUNK: Final = 0.9  # time between chunks [s]; a killed process loses less than one second
-BLOCK: Final = 100  # largest number of cycles per chunk; in lockstep, cycles are faster than in real time
+_UNLIMITED: Final = 1 << 40  # chunk size [bytes], so large that a chunk never ends because of its size
+CHUNK: Final = 0.9  # time between chunks [s]; if a process is killed, less than one second is lost
+BLOCK: Final = 100  # largest number of cycles per chunk, because cycles in lockstep are faster than in real time
 ROOM: Final = 4096  # capacity of the queue, sufficient for the cycles of 41 s
 PATIENCE: Final = 0.1  # time between two checks that the writer thread is alive [s]
 
 
 class _Unbuffered:
-    """Unbuffered output, in place of the buffered writer of the library."""
+    """Unbuffered output, which replaces the buffered writer of the library."""
 
     def __init__(self, file: RawIOBase) -> None:
         self._file = file
@@ -73,8 +73,8 @@ class McapFile:
 
     def __init__(self, file: RawIOBase, robot: Robot, period: float, epoch: int = 0) -> None:
         """Begin a log."""
-        # file: output, opened without buffer, closed by the caller; period: period of a cycle [s]; epoch: offset from
-        # the given times to times of the log [ns]
+        # file: output, opened without buffer, closed by the caller; period: period of a cycle [s]; epoch: times of the
+        # log minus given times [ns]
         import xarray  # noqa: F401 — loaded here, before the machine moves
         from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -86,7 +86,7 @@ class McapFile:
         self._plans = 0
         self._blocks = 0
         output: Any = _Unbuffered(file)
-        writer: Any = Writer(output, chunk_size=_UNLIMITED, enable_data_crcs=True)  # Any, because partly typed
+        writer: Any = Writer(output, chunk_size=_UNLIMITED, enable_data_crcs=True)  # Any: the library is partly typed
         self._writer = writer
         writer.start(library=mcap_layout.SOURCE)
         self._attach(mcap_layout.HEAD, mcap_layout.JSON, mcap_layout.head_of(dump_robot(robot), period))
@@ -100,13 +100,13 @@ class McapFile:
         self._channels = {topic: writer.register_channel(topic, *kind) for topic, kind in kinds.items()}
 
     def begin(self, plan: Plan) -> int:
-        """Attach a plan; returns its index."""
+        """Write a plan as an attachment. Returns the index of the plan."""
         number, self._plans = self._plans, self._plans + 1
         self._attach(mcap_layout.PLAN.format(number), mcap_layout.PACKED, pack_dataset(plan_dataset(plan)))
         return number
 
     def end(self, number: int, status: str, reason: str) -> None:
-        """Attach the end of the plan with the index `number`."""
+        """Write the end of the plan with the index `number` as an attachment."""
         name = mcap_layout.END.format("none" if number == NONE else number)
         self._attach(name, mcap_layout.JSON, json.dumps({"status": status, "reason": reason}).encode())
 
@@ -158,7 +158,7 @@ class McapFile:
     def _known(
         columns: Mapping[str, NDArray[Any]], stamps: list[int], share: int
     ) -> list[tuple[int, dict[str, Array]]]:
-        """Time stamp, pose and tensions of every `share`-th cycle. Cycles without an estimated pose are left out."""
+        """Time stamp, pose and tensions of one in `share` cycles. Cycles without an estimated pose are left out."""
         names = ("position", "quaternion", "tension")
         known = np.flatnonzero(np.isfinite(columns["position"]).all(axis=1))
         return [(stamps[k], {name: columns[name][k] for name in names}) for k in known[::share].tolist()]
@@ -172,11 +172,11 @@ def check_packages() -> None:
 
 
 class Recorder:
-    """Log that a separate thread writes while a controller or a twin runs.
+    """Recording of a log: a separate thread writes the file while a controller or a twin runs.
 
     Data are put into a queue, so that the caller never waits for a disk. If the queue or the disk is full, recording
-    stops permanently. The attribute `stopped` then gives the reason, and the file keeps its data. Numbers are rounded
-    to the numbers of decimals in `DECIMALS`.
+    stops permanently. The attribute `stopped` then gives the reason, and the file keeps the data written so far.
+    Numbers are rounded to the numbers of decimals in `DECIMALS`.
     """
 
     def __init__(
@@ -193,7 +193,7 @@ class Recorder:
         # file: for example "run.mcap"; an existing regular file is replaced, any other target is refused. robot: the
         # robot used by the controller. period: period of a cycle [s]. group_count: number of groups G; None: two
         # winches per group. epoch: time of the log minus time of the link's clock [ns]; None: the log starts at the
-        # present time of day. stream: unbuffered output that is used instead of the file
+        # current date and time. stream: unbuffered output that is used instead of the file
         self.file = check_file(file_path(file))
         check_packages()
         self._robot, self._period = instance(robot, Robot, "robot"), period
@@ -271,7 +271,7 @@ class Recorder:
             self._why = f"{self.file}: {ROOM} entries wait to be written, and the queue is full; the disk is too slow"
 
     def _date(self, time_of_link: float) -> None:
-        """Set the start time of the log, so that the log has times of day."""
+        """Set the start time of the log, so that times in the log are dates and times of day."""
         if self._epoch is None:
             self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * mcap_layout.NANO)
             for event in self._early:
@@ -285,7 +285,7 @@ class Recorder:
                 self._mcap.finish()
         except OSError as error:
             self._why = f"{self.file}: cannot be written ({_reason(error)})"
-        except Exception as error:  # any error, because the control loop must continue; the operator receives a message
+        except Exception as error:  # any error: the control loop must continue; the operator receives a message
             self._why = f"{self.file}: {type(error).__name__}: {error}; a mistake in sagline"
 
     def _write(self) -> None:
@@ -324,7 +324,7 @@ class Recorder:
         self._plan = NONE
 
     def _close_block(self) -> None:
-        """Write the collected cycles."""
+        """Write the collected cycles to the log."""
         if not len(self._tape):
             return
         none = ExecutionStatus.UNKNOWN

@@ -26,18 +26,18 @@ CHECKED: Final = 20_000  # largest number of triangles for which self-intersecti
 _MEANT: Final = "Check that it is the file you mean."
 _CORNER_ZERO: Final = re.compile(rb"^[ \t]*f[ \t](?:.*[ \t])?[+-]?0+(?=[/\s]|\Z)", re.MULTILINE)
 KINDS: Final = (".stl", ".ply", ".obj", ".glb")
-_CONTACTS: Final = 40  # number of contacts that are searched per triangle; most contacts are with neighbors
+_CONTACTS: Final = 40  # largest number of contacts that are searched per triangle; most contacts are with neighbors
 _UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from z up to y up, as in glTF
 ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
 _VTK: Final = (".vtk", ".vtu")
 
 
 def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = None) -> Mesh:
-    """Read a solid from a file: an obstacle around a robot, or a platform.
+    """Read a solid from a file. The solid is an obstacle around a robot, or a platform.
 
     Args:
-        file: STL, PLY, OBJ or GLB file with at most 200 MB and a million triangles. z points up. In a GLB file, y
-            points up by the standard; the mesh is then rotated.
+        file: STL, PLY, OBJ or GLB file with at most 200 MB and a million triangles. z points up. In a GLB file y points
+            up by its standard, so that such a mesh is rotated.
         unit: Unit of the coordinates, for example "mm"; files of these formats do not contain the unit.
         name: Name; None: the name of the file.
 
@@ -66,7 +66,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
         )
     with value_errors(path):
         mesh = Mesh(vertices, faces, called)
-    if len(faces) <= CHECKED and (crossing := first_crossing(mesh)) is not None:
+    if len(faces) <= CHECKED and (crossing := _first_crossing(mesh)) is not None:
         where = ", ".join(f"{value:.4g}" for value in crossing)
         reason = f"crosses itself at ({where}) m, {extent_text(mesh.vertices)}; allowed: a simple surface"
         raise FileError(path, reason, "Unite the parts in the program that made them, or load the parts one by one.")
@@ -85,7 +85,7 @@ def meters(unit: str, item: str) -> float:
 
 
 def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
-    """Distinct vertices [m] and non-degenerate triangles of a file; `unit`: length of the file's unit [m]."""
+    """Distinct vertices [m] and non-degenerate triangles of a file. `unit`: length unit of the file [m]."""
     try:
         import trimesh
     except ImportError:
@@ -95,7 +95,7 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
         line = data.count(b"\n", 0, zero.end()) + 1
         raise FileError(path, f"has a face with corner 0 in line {line}; allowed: from 1, or from -1 back", _MEANT)
     try:
-        with np.errstate(all="ignore"):  # coordinates that are not numbers are refused below
+        with np.errstate(all="ignore"):  # the check below refuses coordinates that are not numbers
             read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
             coordinates = np.asarray(read.vertices, dtype=np.float64) * unit
             if not np.isfinite(coordinates).all():
@@ -106,7 +106,7 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
         vertices, faces = unit * np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
     except SaglineError:
         raise
-    except Exception as error:  # all errors, because the readers raise many kinds of errors for a wrong file
+    except Exception as error:  # all errors are caught, because the readers raise many kinds of errors for a wrong file
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise FileError(path, f"cannot be read as {kind.upper()} ({reason})", _MEANT) from None
     if not len(faces):
@@ -115,8 +115,8 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
     return (vertices @ _UPRIGHT.T if kind == "glb" else vertices), faces[distinct]
 
 
-def first_crossing(mesh: Mesh) -> Array | None:
-    """Point [m] at which a surface crosses itself; None without a crossing. Common edges and corners are allowed."""
+def _first_crossing(mesh: Mesh) -> Array | None:
+    """Point [m] where a surface crosses itself, or None. Triangles with a common edge or corner do not cross."""
     from sagline.interference.meshed import package
 
     fcl = package()
@@ -174,7 +174,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
     except ModuleNotFoundError:
         raise FileError.not_installed("trimesh", "Surfaces need it", "workspace") from None
     vertices, faces = surface.vertices, surface.faces
-    if kind == "stl":  # STL has no list of vertices, so readers merge corners that are equal in single precision
+    if kind == "stl":  # STL has no list of vertices; its readers merge corners that are equal in single precision
         vertices, faces = _in_single_precision(vertices, faces)
     if kind == "glb":
         vertices = np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)

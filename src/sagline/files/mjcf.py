@@ -2,10 +2,10 @@
 
 The cylinders do not swivel. The platform end of a cable moves perpendicular to the chord by small distances: by u in
 the vertical plane of the cable, and by v out of this plane. If the pulley swivels, the cable becomes longer by u^2/(2
-l) + v^2 cos phi/(2 s). Here, l is the free length, and s is the distance of the end from the swivel axis. On a fixed
-cylinder, the cable unrolls to a straight line and becomes longer by v^2/(2 a); a is the length from the first point to
-the end. The tendon therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at
-which the tendon leaves the cylinder. Force and stiffness are then the same as with a swiveling pulley.
+l) + v^2 cos phi/(2 s), where l is the free length, and s is the distance of the platform end from the swivel axis. On a
+fixed cylinder, the cable becomes longer by v^2/(2 a), where a is the length from the first point to the end. The tendon
+therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at which the tendon leaves
+the cylinder. Force and stiffness are then the same as with a swiveling pulley.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ NOTE = (
 )
 _OFF = 0.05  # smallest distance of a tendon's start from its cylinder, in radii; a closer tendon would not wrap
 _WIDTH = 0.2  # ratio of the drawn width of a pulley to its radius
-_BESIDE = 2.0  # distance of the side point from the pulley center in radii, on the side of the cable
+_BESIDE = 2.0  # distance of the side point from the pulley center [radii], on the side where the cable is
 _LONGEST = 1e3  # largest length of a tendon before its cylinder, in pulley radii
 _NOTE = (
     " Written by sagline. Every cable is a straight spring that pulls and never pushes, with the given unstrained "
@@ -47,19 +47,19 @@ _NOTE = (
     "that of the robot: it brings the platform to rest, and also acts on slack cables. "
 )
 _RADIUS = 0.002  # ratio of the radius of drawn cable ends to the size of the robot
-_DRAWN = {"contype": "0", "conaffinity": "0"}  # geometry without contacts
+_DRAWN = {"contype": "0", "conaffinity": "0"}  # collision settings of a geometry that makes no contacts
 _THINNEST = 0.02  # ratio of the shortest to the longest edge of a displayed box
 _STEPS = 20.0  # time steps per period of the fastest motion
 _LONGEST_STEP = 0.002  # default time step of MuJoCo [s]
-_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # rounds the time step down to two digits
-_STRETCH_DAMPING = 4.0  # cable damping: critical at half the frequency bound, which is about the highest frequency
+_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # number of digits to which the time step is rounded down
+_STRETCH_DAMPING = 4.0  # critical damping at half the frequency bound, which is about the highest frequency
 _SWING_DAMPING = 0.4  # joint damping: a fifth of critical damping
 _ROUNDING = 1e-12
 _SHORTEST = 1e-6  # shortest cable [m]
 
 
 def _lead_of(robot: Robot, pose: Pose) -> tuple[Array, Array, Array]:
-    """First points of the tendons and side points of the pulleys (m, 3), and missing lengths (m,), world axes [m]."""
+    """First points of tendons and side points of pulleys, (m, 3), world axes, and missing lengths, (m,) [m]."""
     # A side point is beside a pulley, on the side of the cable. A missing length is the cable off the drum minus the
     # length of the tendon; it is negative if the tendon is longer
     radius, entry = pulleys_of(robot)
@@ -89,7 +89,7 @@ def _add_pulleys(world: Element, robot: Robot, pose: Pose, side: Array) -> None:
 
 
 def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
-    """Add an element; numbers in its attributes are written with all digits."""
+    """Add an element to `parent`. Numbers in its attributes are written with all digits."""
     texts = {
         name: value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
         for name, value in attributes.items()
@@ -140,7 +140,7 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
     root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     step = f"{_DOWN.create_decimal_from_float(time_step):g}"
-    # implicitfast integrates damping implicitly, so that damping has no effect on the largest time step
+    # implicitfast integrates damping implicitly, so that damping does not limit the time step
     _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator="implicitfast")
     radius = _RADIUS * _add_view(root, robot)
     world = _add(root, "worldbody")
@@ -168,10 +168,10 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
 
 
 def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
-    """Time step [s], ratio of a cable's damping to its stiffness [s], damping of each joint [N s/m, N m s/rad]."""
+    """Time step [s], ratio of damping to stiffness of the cables [s], and damping of the joints [N s/m, N m s/rad]."""
     # The joint damping is zero if the cables resist every motion. At every pose, the squared angular frequency has a
     # bound: the sum over the cables of stiffness times the largest mobility of the platform end. Forces that rotate
-    # with the platform increase the frequency; the large number of steps per period is a margin for these forces.
+    # with the platform can increase the frequency further; the large number of steps per period covers this.
     levers = (robot.platform_anchors - robot.center_of_mass) @ pose.matrix.T
     along, about = robot.freedom[:, :3], robot.freedom[:, 3:]
     moved = along + np.cross(about, levers[:, None])  # displacement of the end of cable i in free motion j, (m, n, 3)
@@ -243,12 +243,12 @@ def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag:
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
-    """Inertia for MuJoCo. If MuJoCo refuses the robot's inertia: an inertia of equal effect on the free motions."""
+    """Inertia for MuJoCo. If MuJoCo would refuse the robot's inertia: another inertia, equal in the free motions."""
     least, middle, most = np.linalg.eigvalsh(robot.inertia)
-    missing = most - (least + middle) + _ROUNDING * most  # zero or less for a body, except for rounding
+    missing = most - (least + middle) + _ROUNDING * most  # a real body has zero or less, except for rounding
     if least > 0.0 and missing <= 0.0:
         return robot.inertia
-    if robot.motion_pattern == "3R3T":  # a flat plate, or an impossible inertia, which MuJoCo reports
+    if robot.motion_pattern == "3R3T":  # a flat plate, or an impossible inertia; MuJoCo itself reports the second case
         return robot.inertia + missing * np.eye(3) if missing < 2.0 * _ROUNDING * most else robot.inertia
     axes = robot.freedom[:, 3:] @ pose.matrix  # rotation axis of planar motion in the platform's axes
     moment = np.einsum("ij,jk,ik->", axes, robot.inertia, axes)

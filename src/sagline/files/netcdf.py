@@ -1,8 +1,8 @@
 """Formats of results, and NetCDF files with a digest at the end. Damaged files are not read.
 
 An HDF5 file states its own length, and HDF5 ignores all bytes after it. The digest is therefore appended to the file.
-It is checked first, because reading a damaged file may take any amount of memory and time. A file without a digest is
-not read.
+The digest is checked first, because reading a damaged file may take any amount of memory and time. A file without a
+digest is not read.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from sagline.core.arguments import file_path, instance
 from sagline.core.errors import FileError, InvalidValueError, shortened
-from sagline.files.reading import check_regular, unreadable
+from sagline.files.reading import HDF_BEGIN, check_regular, unreadable
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.variables import PARTS
 from sagline.files.writing import atomic_file
@@ -40,14 +40,13 @@ OTHERS: Final = {
 }
 Choice = TypeVar("Choice")
 T = TypeVar("T")
-_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # first bytes of every NetCDF-4 file
 _KINDS: Final = {
     **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
     **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
-INFLATION = 1000  # largest ratio of the size in memory to the file size; files of sagline have smaller ratios
-HEADERS: Final = 1 << 18  # [bytes], sufficient for all names and attributes, except for long texts such as the robot
+INFLATION = 1000  # largest allowed ratio of the size in memory to the file size; files of sagline have smaller ratios
+HEADERS: Final = 1 << 18  # allowed size [bytes] of all names and attributes, except for long texts such as the robot
 _HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
 _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
 _BLOCK = 1 << 20  # bytes per read
@@ -60,7 +59,7 @@ def seal(file: Path) -> None:
 
 
 def _digest_is_right(file: Path) -> bool | None:
-    """True if the digest at the end of a file matches its content; None if the file has no digest."""
+    """True if the digest at the end of the file matches the content before it. None if the file has no digest."""
     with file.open("rb") as handle:
         before = max(0, file.stat().st_size - _LENGTH)
         handle.seek(before)
@@ -72,7 +71,7 @@ def _digest_is_right(file: Path) -> bool | None:
 
 
 def _line(handle: BinaryIO, size: int) -> bytes:
-    """Digest line of the next `size` bytes of a file. The file position moves behind these bytes."""
+    """Read the next `size` bytes of a file, and return their digest line."""
     found = sha256()
     while size > 0 and (block := handle.read(min(_BLOCK, size))):
         found.update(block)
@@ -82,7 +81,7 @@ def _line(handle: BinaryIO, size: int) -> bytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format(Generic[T]):
-    """The format of files with one kind of result, and texts for messages."""
+    """The format of the files of one kind of result, and texts for messages."""
 
     kind: type[T]  # type of the result
     name: str  # name of the content: "plan"
@@ -90,24 +89,28 @@ class Format(Generic[T]):
     give: str  # next step for the user: "Give the .nc file that sagline track wrote."
     again: str  # next step for a damaged file
     key: str  # attribute that holds the version of the format
-    version: int  # newest version of the format; incremented with every change that an older sagline could misread
-    # functions that create the data set of a result, and the result from a data set and a path for messages; None if
-    # another module writes the files, or if results are only written
+    version: int  # newest version of the format; incremented with changes that an older sagline could misread
+    # `pack` creates the data set of a result, and `unpack` creates the result from a path for messages and a data set;
+    # None if another module does this, or if files are only written
     pack: Callable[[T], Dataset] | None = None
     unpack: Callable[[Path, Dataset], T] | None = None
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
         """Write a result to a NetCDF file atomically, with a digest at its end."""
         assert self.pack is not None
-        write_dataset(self.pack(instance(result, self.kind, self.name)), file_path(file))
+        path = file_path(file)
+        if path.suffix.lower() not in ("", ".nc"):
+            reason = f"the suffix is {path.suffix}; allowed: .nc"
+            raise FileError(path, reason, f"Call it {path.stem}.nc, or write a table with to_csv.")
+        write_dataset(self.pack(instance(result, self.kind, self.name)), path)
 
     def load(self, file: os.PathLike[str] | str) -> T:
         """Read a file that `save` wrote."""
         path = file_path(file)
-        data = read_dataset(path, self)
+        data = _read_dataset(path, self)
         self.check(path, data.attrs)
         assert self.unpack is not None
-        with file_errors(path):
+        with _file_errors(path):
             return self.unpack(path, data)
 
     def check(self, path: Path, attributes: Mapping[str, Any]) -> None:
@@ -125,7 +128,7 @@ class Format(Generic[T]):
         check_version(path, int(found), self.version, attributes.get("source"), self.key)
 
     def attributes(self, title: str) -> dict[str, Any]:
-        """Attributes that every file of this format has."""
+        """Attributes of every file of this format."""
         return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
 
     def dataset(
@@ -136,7 +139,7 @@ class Format(Generic[T]):
         variables: Mapping[str, Any],
         coordinates: Mapping[str, Any] | None = None,
     ) -> Dataset:
-        """Make a data set without indexes for its dimensions. The reader makes the necessary indexes."""
+        """Make a data set whose dimensions have no indexes. A reader of the file makes the indexes that it needs."""
         from xarray import Coordinates, Dataset
 
         parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
@@ -168,14 +171,14 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
                 # _FillValue None: numbers are stored unchanged, and NaN does not mean "missing"
                 encoding = {str(name): {"_FillValue": None} for name in part.variables}
                 mode: Literal["w", "a"] = "w" if group is None else "a"
-                # absolute path, because xarray expands ~ to the home folder
+                # the path is made absolute, because xarray would expand ~ to the home folder
                 part.to_netcdf(partial.absolute(), mode, group=group, engine="h5netcdf", encoding=encoding)
-        except RuntimeError as error:  # h5py raises this error on a full disk
+        except RuntimeError as error:  # h5py raises this error if the disk is full
             raise OSError(str(error)) from error
         seal(partial)
 
 
-def read_dataset(path: Path, content: Format[Any]) -> Dataset:
+def _read_dataset(path: Path, content: Format[Any]) -> Dataset:
     """Read the data set of an undamaged file. The digest is checked before the content is read."""
     try:
         check_regular(path, path.stat().st_mode)  # a pipe is not opened, because opening would wait for its writer
@@ -192,7 +195,7 @@ def read_dataset(path: Path, content: Format[Any]) -> Dataset:
 
 
 @contextmanager
-def file_errors(path: Path) -> Iterator[None]:
+def _file_errors(path: Path) -> Iterator[None]:
     """Convert errors about values of a file to a FileError with the name of the file."""
     try:
         yield
@@ -235,15 +238,15 @@ def _load(path: Path, content: Format[Any]) -> Dataset:
             if data.nbytes > INFLATION * size:
                 raise ValueError(f"{size} bytes for {data.nbytes:.2g} bytes of data")
             return data.load()
-    except Exception as error:  # h5py, h5netcdf and xarray have no common error class for a damaged file
+    except Exception as error:  # the libraries have no common error class for a damaged file
         raise FileError(path, "is not a NetCDF file of sagline, but ends with a digest", content.again) from error
 
 
 def _cause(path: Path, content: Format[Any]) -> tuple[str, str]:
-    """Reason why a file cannot be read, and the next step. They replace technical messages of the libraries."""
+    """Reason why a file cannot be read, and the next step. The reason replaces technical messages of the libraries."""
     with path.open("rb") as file:
-        begin = file.read(len(_BEGIN))
-    if begin == _BEGIN:
+        begin = file.read(len(HDF_BEGIN))
+    if begin == HDF_BEGIN:
         reason = f"was cut off or edited, or is not a {content.made}: it does not end with a digest"
         return reason, content.again
     kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
@@ -251,7 +254,7 @@ def _cause(path: Path, content: Format[Any]) -> tuple[str, str]:
 
 
 def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
-    """Numeric attributes of `source`. Each is followed by an attribute with its unit, unless the unit is None."""
+    """Numeric attributes of `source`. An attribute with the unit follows each attribute whose unit is not None."""
     found: dict[str, Any] = {}
     for name, unit in units.items():
         found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
@@ -269,7 +272,7 @@ def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -
 def choice_of(
     path: Path, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
 ) -> Choice:
-    """Restore an object from `choice_attributes`. Raise FileError if the type or an option of the object is unknown."""
+    """Restore an object from attributes of `choice_attributes`. Raise FileError for an unknown type or option."""
     name = attributes[key]
     if name not in choices:
         refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
@@ -279,7 +282,7 @@ def choice_of(
     try:
         options = {option: _plain(value) for option, value in given.items() if value is not None}
         found: Choice = choice(**{**options, **known})
-    except TypeError as error:  # for example a text in place of a number
+    except TypeError as error:  # the cause is, for example, a text in place of a number
         raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
     return found
 
@@ -297,8 +300,8 @@ def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:
     return robot
 
 
-# Writer of each type of result: a module with a function save(result, file), or a format in a module. It is loaded when
-# a result of its type is saved.
+# Writer of each type of result: a module with a function save(result, file), or a format in a module. The module is
+# loaded when a result of this type is saved.
 WRITERS: Final = {
     "Calibration": "calibration_file.FORMAT",
     "CalibrationPoses": "path_file",
@@ -313,7 +316,7 @@ WRITERS: Final = {
 
 
 def writer_of(result: object) -> Any:
-    """Find the writer of results of this type or of a base class; None if there is none."""
+    """Find the writer for the type of `result` or for one of its base classes; None if no writer exists."""
     name = next((kind.__name__ for kind in type(result).__mro__ if kind.__name__ in WRITERS), None)
     if name is None:
         return None
@@ -323,7 +326,7 @@ def writer_of(result: object) -> Any:
 
 
 def dataset_of(result: Any) -> Dataset:
-    """Data set of a result in its NetCDF format. A result without a format has a table with the dimension row."""
+    """Data set of a result in its NetCDF format. A result without a format becomes a table with the dimension row."""
     pack = getattr(writer_of(result), "pack", None)
     if pack is not None:
         found: Dataset = pack(result)

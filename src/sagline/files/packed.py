@@ -1,10 +1,10 @@
 """Lossless compression of columns of numbers, and of data sets inside other files.
 
 Measured and planned values are smooth in time. Each column is converted to integers. If all values have few decimals,
-the integers are the decimals times a power of ten. Otherwise they are the bits of the floats, changed so that they have
-the order of the numbers. Differences of order 0 to 5 of the integers are stored, in the order that needs the fewest
-bits. The upper bytes of these differences are nearly all zero. Bytes of equal weight are stored together, so that
-zstandard compresses them strongly.
+the integers are the decimals times a power of ten. If values have many decimals, the integers are the bits of the
+floats, changed so that larger numbers have larger integers. The integers are stored as differences of order 0 to 5; the
+order with the fewest bits is selected. The upper bytes of the differences are nearly all zero. Bytes of equal weight
+are stored together, because zstandard then compresses them strongly.
 """
 
 from __future__ import annotations
@@ -26,26 +26,24 @@ MOST_ORDER: Final = 5
 LEVEL: Final = 9  # compression level of zstandard; higher levels take much longer and save little
 TYPES: Final = ("float64", "int64", "int8", "bool")
 _EXACT: Final = 2.0**53  # all integers below this number are exact as floats
-_GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinity and -infinity in a column of decimals
+_GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinity, -infinity in a column of decimals
 _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 
 
-# Head of a packed column: name; type and shape of the values; largest number of decimals, -1 for integers or bits of
-# floats; order of the stored differences
+# Head of a packed column: name; type and shape of the values; largest number of decimals (-1 for integers or bits of
+# floats); order of the stored differences
 _Column: TypeAlias = tuple[str, str, tuple[int, ...], int, int]
 
 
 def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
-    """Round numbers to `decimals`. Each result is the float that is nearest to the decimal, and never -0.0."""
+    """Round numbers to `decimals`. Each result is the float nearest to the rounded decimal number, and never -0.0."""
     scale = 10.0**decimals
-    whole = np.abs(values) < _EXACT / scale  # larger floats do not have so many decimals
+    whole = np.abs(values) < _EXACT / scale  # a larger float does not have this number of decimals
     return np.asarray(np.where(whole, np.rint(np.where(whole, values, 0.0) * scale) / scale, values) + 0.0)  # no -0.0
 
 
 def pack(
-    columns: Mapping[str, NDArray[Any]],
-    decimals: Mapping[str, int] | None = None,
-    rest: Callable[[], Any] = int,
+    columns: Mapping[str, NDArray[Any]], decimals: Mapping[str, int] | None = None, rest: Callable[[], Any] = int
 ) -> bytes:
     """Pack columns without loss. The first axis of each column is time."""
     # columns: floats, integers or flags of any shape; the first axis is time
@@ -57,7 +55,7 @@ def pack(
     heads, parts = [], []
     for name, values in columns.items():
         whole, places = _whole(np.asarray(values), known.get(name, -1))
-        order, small = _smallest(whole.reshape(len(whole) if whole.ndim else 1, -1) if whole.size else whole)
+        order, small = smallest_differences(whole.reshape(len(whole) if whole.ndim else 1, -1) if whole.size else whole)
         heads.append((name, values.dtype.name, values.shape, places, order))
         parts.append(_planes(small))
         rest()
@@ -66,7 +64,7 @@ def pack(
 
 
 def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
-    """Restore columns from data of `pack` exactly; `most`: largest allowed size of the columns [bytes]."""
+    """Restore columns exactly from data that `pack` returned. `most`: largest allowed size of the columns [bytes]."""
     from zstandard import ZstdDecompressor, ZstdError, get_frame_parameters
 
     try:
@@ -81,7 +79,7 @@ def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
         start = 4 + int.from_bytes(plain[:4], "little")
         heads = json.loads(plain[4:start])
         columns: list[_Column] = [(name, kind, tuple(shape), *rest) for name, kind, shape, *rest in heads]
-    except (ZstdError, TypeError, ValueError) as error:  # JSON also raises ValueError
+    except (ZstdError, TypeError, ValueError) as error:  # reading JSON can also raise ValueError
         raise ValueError(f"no packed columns ({error})") from None
     found: dict[str, NDArray[Any]] = {}
     for column in columns:
@@ -105,7 +103,7 @@ def _count(column: _Column) -> int:
 
 
 def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]:
-    """Values as integers, and the number of decimals that scales them (-1: integers, or bits of floats)."""
+    """Values as integers, and the number of decimals that scales them; -1 for given integers or bits of floats."""
     if values.dtype.name not in TYPES:
         raise TypeError(f"columns of {values.dtype} are not packed")
     if values.dtype != np.float64:
@@ -127,16 +125,16 @@ def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]
 
 
 def _decimal(whole: NDArray[np.int64], decimals: int) -> NDArray[np.float64]:
-    values = np.asarray(whole / 10.0**decimals)  # the float nearest to the decimal, because both operands are exact
+    values = np.asarray(whole / 10.0**decimals)  # both operands are exact: the float nearest to the decimal
     for gap, value in zip(_GAPS, _GAP_VALUES, strict=True):
         values[whole == gap] = value
     return values
 
 
-def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
-    """Order of differences that needs the fewest bits, and the differences. Their lowest bit is the sign."""
+def smallest_differences(whole: NDArray[np.int64], most: int = MOST_ORDER) -> tuple[int, NDArray[np.uint64]]:
+    """Order up to `most` of the differences with the fewest bits, and these differences; the lowest bit is the sign."""
     best: tuple[float, int, NDArray[np.uint64]] | None = None
-    for order in range(MOST_ORDER + 1):
+    for order in range(most + 1):
         small = ((whole << 1) ^ (whole >> 63)).view(np.uint64)
         bits = float(np.log2(small + 1.0).sum())
         if best is None or bits < best[0]:
@@ -176,7 +174,7 @@ def pack_dataset(data: Dataset) -> bytes:
         if labels is None:
             numbers[str(name)] = values
         variables[str(name)] = [variable.dims, variable.attrs, labels]
-    # numbers and arrays of numpy are converted for JSON
+    # JSON cannot store numbers and arrays of numpy, which are therefore converted
     head = json.dumps({"attributes": data.attrs, "variables": variables}, default=lambda value: value.tolist())
     text = head.encode()
     return b"".join((len(text).to_bytes(4, "little"), text, pack(numbers)))

@@ -1,4 +1,4 @@
-"""Path files: waypoints in YAML, also of calibration poses, or samples of time and pose in CSV."""
+"""Path files: waypoints or calibration poses in YAML, or samples of time and pose in CSV."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.calibration.observations import counts_at, has_drum_data
 from sagline.core.arguments import file_path
 from sagline.core.arrays import FARTHEST, Array
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
+from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry
 from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
 from sagline.files.writing import write_text
@@ -31,7 +31,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
-_LEAST_STEP = 1e-12  # shortest time step [s]; differences over shorter steps are too inexact for a velocity
+_LEAST_STEP = 1e-12  # shortest time step [s]; over a shorter step, the velocity from a difference would be too inexact
 
 PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
@@ -63,7 +63,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
 
 
 def _check_columns(table: CsvTable) -> None:
-    """Refuse a table without position columns, with an incomplete orientation, or with two forms of orientation."""
+    """Refuse a table if position columns are missing, or if its orientation is incomplete or given in two forms."""
     orientation = table.columns.keys() & set(EULER + QUATERNION)
     wanted = PLACE + next((way for way in (EULER, QUATERNION) if orientation & set(way)), ())
     table.check_columns(wanted, f"; found: {', '.join(table.columns)}")
@@ -78,8 +78,8 @@ def _check_columns(table: CsvTable) -> None:
 def load_path(file: str | os.PathLike[str]) -> Path:
     """Read a path from a file of waypoints (.yaml, .yml) or of sampled poses (.csv).
 
-    A YAML file contains waypoints. The platform moves from rest to rest between them (see `quintic_path`). A quantity
-    is a number in SI (lengths in m, angles in rad) or a text with its unit:
+    A YAML file contains waypoints. Between two waypoints, the platform moves from rest to rest (see `quintic_path`). A
+    quantity is a number in SI (lengths in m, angles in rad) or a text with its unit:
 
         rate: 100                             # samples per second, 100 if left out
         profile: septic                       # continuous jerk (see `septic_path`); quintic if left out
@@ -96,7 +96,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     `qx,qy,qz,qw`, or nothing for a constant orientation. Units are in brackets, `time [s],x [mm],...,alpha [deg]`; the
     defaults are s, m and rad. A spline through the samples gives velocity and acceleration (see `path_from_samples`).
 
-    Quaternions in both kinds of files have length 1 within 1e-3 (rounding of printed decimals), and are normalized.
+    The length of a quaternion may differ from 1 by 1e-3, because decimals are rounded; quaternions are normalized.
 
     Args:
         file: The file; its suffix selects the format.
@@ -124,7 +124,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
 
 
 class _Waypoint(PoseEntry):
-    """Waypoint: a pose, and the tensions and lengths of `CalibrationPoses.save`, which a path does not use."""
+    """Waypoint: a pose. Tensions and lengths from `CalibrationPoses.save` are allowed, but a path does not use them."""
 
     frame_end_tension: Any = None
     unstrained_length: Any = None
@@ -140,15 +140,13 @@ class _Waypoints(YamlEntry):
     angular_acceleration: Annotated[Any, "rad/s^2"] = None
     profile: Literal["quintic", "septic"] = "quintic"
     waypoints: list[_Waypoint]
-    calibration: dict[str, Any] | None = None  # content of a file of calibration poses
+    calibration: dict[str, Any] | None = None  # data of a file of calibration poses
 
 
 def _path_from_yaml(path: FilePath, text: str) -> Path:
     entry = validate(parse_mapping(text, path), _Waypoints, path)
     timing = entry.given()
-    return PROFILES[entry.profile](
-        [pose_of_entry(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing
-    )
+    return PROFILES[entry.profile]([w.pose(f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing)
 
 
 HEAD: Final = """\
@@ -160,7 +158,7 @@ SPEED: Final = 0.2  # largest speed between two poses [m/s]
 ANGULAR_SPEED: Final = 0.1  # largest angular speed between two poses [rad/s]
 DWELL: Final = 2.0  # shortest time from one pose, or one set of tensions at a pose, to the next [s]
 RATE: Final = 10.0  # sample rate of the path [1/s]
-_PEAK: Final = 15.0 / 8.0  # ratio of peak speed to mean speed of a quintic segment
+_PEAK: Final = 15.0 / 8.0  # peak speed of a quintic segment divided by its mean speed
 _DECIMALS: Final = {"position": 4, "quaternion": 6, "frame_end_tension": 1, "unstrained_length": 5, "counts": 0}
 _DIGITS: Final = 4  # significant digits of an expected error
 
@@ -188,7 +186,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
 
 
 def _durations(poses: Pose) -> list[float]:
-    """Duration of each motion [s]: at least DWELL, and sufficient for any machine."""
+    """Duration of each motion [s]: at least DWELL, and long enough for the allowed speeds."""
     way = np.linalg.norm(np.diff(poses.position, axis=0), axis=1)
     turn = (poses.rotation[1:] * poses.rotation[:-1].inv()).magnitude()
     times = np.maximum(_PEAK * np.maximum(way / SPEED, turn / ANGULAR_SPEED), DWELL)

@@ -9,32 +9,24 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sagline.cables.model import CableState, CableStatus
-from sagline.cables.models import MODELS
+from sagline.cables.models import models_by_name
 from sagline.core.errors import FileError, InvalidValueError
+from sagline.files import variables as v
 from sagline.files.netcdf import Format, choice_attributes, choice_of, index_coordinate, robot_of
-from sagline.files.variables import (
-    SOLVED,
-    SOMEWHERE,
-    STEP,
-    Quantity,
-    check_variables,
-    fields_of,
-    values_of,
-    variables_of_result,
-)
+from sagline.files.variables import SOLVED, SOMEWHERE, STEP, Quantity
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.batch import has_routing
 from sagline.robot.equilibrium import Contact, Equilibrium
 from sagline.robot.pose import Pose
-from sagline.tension.methods import METHODS
+from sagline.tension.methods import methods_by_name
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 CABLE, AXIS, WRENCH, TWIST = ("cable",), ("axis",), ("wrench_part",), ("twist_part",)
-CABLES, CONTACT = "state.cables.", "state.contact."  # states of the free cables, and of the cables on their pulleys
+CABLES, CONTACT = "state.cables.", "state.contact."  # results for the free cables, and for the cables on their pulleys
 CHANGE: Final = "change of the force that makes the pose feasible"
 QUANTITIES = (
     Quantity("unstrained_length", CABLE, "m", "unstrained length L off the drum", known=SOLVED, low=0.0),
@@ -91,6 +83,9 @@ WINDING = Quantity(
     "winding", CABLE, "1", "direction of friction: 1 winding in, -1 paying out, 0 standing", CONTACT, low=-1.0
 )
 
+# variable of a plan with a swivel axis that is not vertical
+AZIMUTH = Quantity("azimuth", CABLE, "rad", "azimuth of the vertical plane of the free cable", CONTACT, SOLVED)
+
 # proofs of infeasibility; older files do not have them
 PROOF = (
     Quantity(
@@ -142,7 +137,7 @@ def _check_plan(data: Dataset, cables: int) -> None:
     optional = (one for one in (WINDING, *PROOF, JERK) if one.name in data.variables)
     quantities = sorted((*QUANTITIES, *machine, *motion, *optional), key=lambda one: one.codes is None)  # codes first
     solved = np.isin(status.values, BALANCED)
-    check_variables(data, quantities, {"cable": cables, "pose": status.size}, rows, solved)
+    v.check_variables(data, quantities, {"cable": cables, "pose": status.size}, rows, solved)
 
 
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
@@ -150,15 +145,15 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
 
     The dimensions are pose (absent for a single pose) and cable. The times of a path are a coordinate of the dimension
     pose. Infeasible poses are included, with status, shortfall, blocking cables and proof; their lengths and forces are
-    NaN. A digest over all values and attributes follows the NetCDF data; it detects later changes.
+    NaN. A digest of all values and attributes follows the NetCDF data. The digest detects later changes of the file.
 
     Args:
         plan: A plan of one robot.
         file: The file, for example "run.nc". An existing regular file is replaced; any other target is refused.
 
     Raises:
-        InvalidValueError: If `plan` has several robots (one per pose). If its cable model or tension method is not part
-            of sagline. If it has values that `inverse` never returns.
+        InvalidValueError: If `plan` has several robots (one per pose). If the cable model or the tension method is not
+            part of sagline. If `plan` has values that `inverse` never returns.
         FileError: If the file cannot be written; an existing file is then unchanged.
 
     Examples:
@@ -179,11 +174,11 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         file: The NetCDF file.
 
     Returns:
-        The plan; its proofs (`farkas` and the following fields) are None if an older file does not contain them.
+        The plan. If an older file does not contain proofs, `farkas` and the fields after it are None.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a plan, or of a newer format. If it was
-            changed after it was written; digest, shapes, units, status codes and signs are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a plan, or of a newer format. If the file was
+            changed after it was written: digest, shapes, units, status codes and signs are checked.
 
     Examples:
         >>> import sagline as sl
@@ -197,16 +192,16 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
 
 
 def plan_dataset(plan: Plan) -> Dataset:
-    """Create the data set of a plan of one robot. An attribute contains the robot."""
+    """Create the data set of a plan of one robot. The robot is stored as an attribute."""
     robot, rows = plan.state.one_robot, ("pose",) * len(plan.state.pose.shape)
     cables = robot.cable_count
     machine = () if plan.state.contact is None else MACHINE
-    variables = variables_of_result(plan, (*QUANTITIES, *machine, WINDING, *PROOF, *MOTION, JERK), rows)
-    coordinates = {"cable": index_coordinate("cable", cables), **variables_of_result(plan, (TIME,), rows)}
+    variables = v.variables_of_result(plan, (*QUANTITIES, *machine, WINDING, AZIMUTH, *PROOF, *MOTION, JERK), rows)
+    coordinates = {"cable": index_coordinate("cable", cables), **v.variables_of_result(plan, (TIME,), rows)}
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "times of rest of the platform"})
-    choices = choice_attributes("model", plan.state.cables.model, MODELS)
-    choices |= choice_attributes("tension", plan.tension, METHODS)
+    choices = choice_attributes("model", plan.state.cables.model, models_by_name())
+    choices |= choice_attributes("tension", plan.tension, methods_by_name())
     data = FORMAT.dataset(f"Cable lengths and tensions of {robot.name}", robot, choices, variables, coordinates)
     _check_plan(data, cables)
     return data
@@ -220,12 +215,12 @@ def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     if behind != has_routing(robot):
         said, has = ("is", "none of its") if behind else ("is not", "some of its")
         raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", FORMAT.again)
-    found = fields_of(data, (*QUANTITIES, *MACHINE, WINDING, TIME, *MOTION, JERK))
+    found = v.fields_of(data, (*QUANTITIES, *MACHINE, WINDING, AZIMUTH, TIME, *MOTION, JERK))
     state, motion = found["state"], found.get("path")
     pose = Pose.from_quaternion(**state["pose"])
-    spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # values of the free span at a pulley
+    spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # values of the free span
     cables = CableState(
-        model=choice_of(path, data.attrs, "model", MODELS),
+        model=choice_of(path, data.attrs, "model", models_by_name()),
         cable=robot.cables,
         gravity=robot.gravity,
         unstrained_length=found["free_length" if behind else "unstrained_length"],
@@ -235,13 +230,13 @@ def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     if behind:
         contact = Contact(wrap_angle=found["wrap_angle"], chord_tension=found["chord_tension"], **state["contact"])
     if motion is not None:
-        motion = Path(pose=pose, **motion, rests=values_of(data, RESTS) if RESTS in data.variables else None)
+        motion = Path(pose=pose, **motion, rests=v.values_of(data, RESTS) if RESTS in data.variables else None)
     return Plan(
         state=Equilibrium(robot, pose, state["wrench"], cables, contact),
         path=motion,
-        tension=choice_of(path, data.attrs, "tension", METHODS),
+        tension=choice_of(path, data.attrs, "tension", methods_by_name()),
         **{name: found[name] for name in ("status", "shortfall", "wrench_residual", "blocking")},
-        **fields_of(data, PROOF),
+        **v.fields_of(data, PROOF),
     )
 
 

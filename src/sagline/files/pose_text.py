@@ -13,8 +13,8 @@ from sagline.files.quantity import in_si, plain_number
 from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
-STRONGEST: Final = 1e12  # [N, N m], larger than on any machine, and far below overflow
-QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, for three decimals
+STRONGEST: Final = 1e12  # largest force and moment [N, N m]: larger than on any machine, and far below overflow
+QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, because files have few decimals
 POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
 WRENCH_STEP: Final = (
     "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
@@ -27,7 +27,7 @@ def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) 
     found = []
     for part in parts:
         number = plain_number(part)
-        if number is None or not abs(number) <= largest:  # True also for NaN
+        if number is None or not abs(number) <= largest:  # the condition is True also for NaN
             raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
         found.append(number)
     return found
@@ -45,7 +45,7 @@ def wrench_of_text(text: str | None, item: str = "--wrench", step: str = WRENCH_
 
 
 def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
-    """Read three or six numbers between commas. If there are three numbers, three zeros are added."""
+    """Read three or six numbers separated by commas. Three numbers are completed by three zeros."""
     parts = text.split(",", maxsplit=6)
     if len(parts) not in (3, 6):
         raise InvalidValueError(item, repr(text), "three or six numbers", step)
@@ -66,30 +66,32 @@ class PoseEntry(YamlEntry):
     euler: _Euler | None = None
     quaternion: Any = None
 
+    def pose(self, item: str) -> Pose:
+        """The pose. InvalidValueError if it is invalid or too far away for any machine."""
+        position = _si_numbers(self.position, 3, "m", f"{item}.position")
+        if (far := float(np.abs(position).max())) > FARTHEST:
+            raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
+        if self.quaternion is None:
+            euler = self.euler or _Euler()
+            angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
+            return Pose.from_euler(position, *_si_numbers(angles, 3, "rad", f"{item}.euler"))
+        if self.euler is not None:
+            raise InvalidValueError(
+                item, "given with euler and quaternion", "one of the two, or none", "Leave one of them out."
+            )
+        quaternion = _si_numbers(self.quaternion, 4, "", f"{item}.quaternion")
+        length = float(np.linalg.norm(quaternion))
+        if abs(length - 1.0) > QUATERNION_TOLERANCE:
+            raise InvalidValueError(
+                f"the length of {item}.quaternion",
+                f"{length:.6g}",
+                f"1 to {QUATERNION_TOLERANCE:g}",
+                f"Correct {item}.",
+            )
+        return Pose.from_quaternion(position, quaternion / length)
 
-def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
-    """Convert `entry` to a pose; raise InvalidValueError if it is wrong, or too far away for any machine."""
-    position = si_numbers(entry.position, 3, "m", f"{item}.position")
-    if (far := float(np.abs(position).max())) > FARTHEST:
-        raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
-    if entry.quaternion is None:
-        euler = entry.euler or _Euler()
-        angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
-        return Pose.from_euler(position, *si_numbers(angles, 3, "rad", f"{item}.euler"))
-    if entry.euler is not None:
-        raise InvalidValueError(
-            item, "given with euler and quaternion", "one of the two, or none", "Leave one of them out."
-        )
-    quaternion = si_numbers(entry.quaternion, 4, "", f"{item}.quaternion")
-    length = float(np.linalg.norm(quaternion))
-    if abs(length - 1.0) > QUATERNION_TOLERANCE:
-        raise InvalidValueError(
-            f"the length of {item}.quaternion", f"{length:.6g}", f"1 to {QUATERNION_TOLERANCE:g}", f"Correct {item}."
-        )
-    return Pose.from_quaternion(position, quaternion / length)
 
-
-def si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
+def _si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
     """Convert `value` from a file to `count` numbers in SI, shape (count,)."""
     numbers = checked(in_si(value, unit, item), item, unit)
     if numbers.shape != (count,):

@@ -24,7 +24,7 @@ _DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # words for infinite numbers and NaN in YAML and Python
 _FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, because pint fails for some
 _UNIT = rf"{_FACTOR}(?:(?:[ \t]?[*/·][ \t]?|[ \t]){_FACTOR}){{0,5}}"
-_BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are no-break spaces, used before units
+_BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are no-break spaces, which programs write before units
 _TORQUE = re.compile(r"\b([cmkM]?N)m\b(?![ \t]?(?:\^|\*\*))")  # Nm is read as N m; Nm^2 and Nms are ambiguous
 _PLAIN = re.compile(rf"[ \t]*(?:({_DECIMAL})|{_WORD})[ \t]*")
 _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*{_UNIT})[ \t]*")
@@ -34,7 +34,7 @@ def plain_number(text: str) -> float | None:
     """Read a number from a decimal text: digits 0 to 9 with optional point, sign and exponent, or inf or nan.
 
     Other notations of YAML, Python or C are not accepted, for example 1:30, 0x10, 1_000 and digits of other alphabets.
-    The result is None if the text is not a number. Only the word inf gives infinity; 1e999 gives the largest float64.
+    None if the text is not a number. Only the word inf gives infinity; the text 1e999 gives the largest float64.
     """
     found = _PLAIN.fullmatch(text) if len(text) <= _LONGEST else None
     if found is None:
@@ -94,16 +94,16 @@ def _factor(given: str, wanted: str) -> float | None:
     try:
         texts = (_TORQUE.sub(r"(\1*m)", given), wanted)
         one, wish = (units.Quantity(1.0, units.parse_units(text)) for text in texts)
-        # root units are compared, because pint would convert 5 Hz to 5 rad/s; its angles are dimensionless
+        # root units are compared; otherwise pint, in which angles are dimensionless, would convert 5 Hz to 5 rad/s
         same = one.to_root_units().units == wish.to_root_units().units
         return float(one.to(wish.units).magnitude) if same else None
     except (PintError, ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError):
-        return None  # any error, because pint's errors have no common base class
+        return None  # any error is caught, because pint's errors have no common base class
 
 
 @cache
 def _registry() -> UnitRegistry[Any]:
-    # built only once and only for a file with units, because this takes as long as a run of `sagline track`
+    # built once, and only for a file with units, because building it takes as long as a run of `sagline track`
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)

@@ -13,6 +13,7 @@ from typing import Final
 from sagline.core.errors import FileError, InvalidValueError
 
 MEGABYTE: Final = 1_000_000
+HDF_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # first bytes of every NetCDF-4 file
 _IRREGULAR: Final = {
     stat.S_IFDIR: ("a folder", "Give the name of a file in it."),
     stat.S_IFCHR: ("a device, not a file", "Name a file."),
@@ -24,7 +25,7 @@ _OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-1
 
 
 def check_regular(path: Path, mode: int) -> None:
-    """Refuse a path whose mode (from `os.stat`) is not that of a regular file."""
+    """Refuse a path that is not a regular file. `mode`: its mode from `os.stat`."""
     if not stat.S_ISREG(mode):
         kind, step = _IRREGULAR.get(stat.S_IFMT(mode), ("no file", "Name a file."))
         raise FileError(path, f"is {kind}", step)
@@ -32,7 +33,7 @@ def check_regular(path: Path, mode: int) -> None:
 
 @contextmanager
 def value_errors(path: Path | str) -> Iterator[None]:
-    """Name the file `path` in the errors of its values."""
+    """Add the name of the file `path` to errors of its values."""
     try:
         yield
     except InvalidValueError as error:
@@ -46,7 +47,7 @@ def unreadable(path: Path, error: Exception) -> FileError:
 
 
 def exists(path: Path) -> bool:
-    """True if a path exists; False for an impossible name."""
+    """True if `path` exists. The result is False for a name that no file can have."""
     try:
         path.stat()
     except (OSError, ValueError):
@@ -63,9 +64,13 @@ def read_bytes(path: Path, limit: float) -> bytes:
             data = file.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte or a lone surrogate
         raise unreadable(path, error) from None
+    if data.startswith(HDF_BEGIN):
+        step = "Give a robot, path or log here. To look at a plan or a simulation: sagline view ROBOT FILE."
+        raise FileError(path, "is a NetCDF file, for example a plan or a workspace", step)
     if len(data) > most:
         size = max(path.stat().st_size, len(data)) / MEGABYTE
-        raise FileError(path, f"has {size:.3g} MB; allowed: {limit:g} MB", "Check that this is the file you mean.")
+        reason = f"is too large: {size:.3g} MB; a file of this kind has at most {limit:g} MB"
+        raise FileError(path, reason, "Check that this is the file you mean.")
     return data
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
     """Load a preset by its name, or a robot file by its path.
 
-    A robot file is YAML. Its keys are the fields of `Robot`; a quantity is a number in SI or a text with its unit:
+    A robot file is YAML. The keys are the fields of `Robot`; a quantity is a number in SI or a text with its unit:
 
         name: my robot
         frame_anchors: [[0, 0, 3], [4000 mm, 0, 3], ...]      # one point per cable
@@ -46,8 +46,8 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
             # origin and standard errors of estimated values, written by `calibrate`
         scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # obstacles: `load_scene`
 
-    A file may be based on a preset: it contains `base: cogiro`, for example, and its own name. It then contains only
-    values that differ from the preset. All other values, and the notes on assumed values, are those of the preset.
+    A file may be based on a preset. Such a file contains a line such as `base: cogiro`, its own name, and only the
+    values that differ from the preset. Other values, and the notes on assumed values, come from the preset.
 
     Args:
         name_or_path: One of `robot_names()`, or the path of a file. A text is a path if it ends with .yaml or .yml,
@@ -122,12 +122,12 @@ def dump_robot(robot: Robot) -> str:
 
 
 def _deviations(found: Mapping[str, Array]) -> dict[str, Any]:
-    """Standard deviations `found`, for the file. A field with equal values becomes a single number."""
+    """Convert the standard deviations `found` for the file. A field with equal values becomes a single number."""
     return {name: (one.flat[0].item() if (one == one.flat[0]).all() else one.tolist()) for name, one in found.items()}
 
 
 def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
-    """Keys of a file. If the file has a base preset, missing keys are added from the preset."""
+    """Keys and values of a robot file. If the file names a base preset, missing keys are added from this preset."""
     if "base" not in data:
         return data
     name = data.pop("base")
@@ -136,14 +136,14 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
         step = f"Did you mean {near}?" if near else "Name one of them, or leave base out."
         raise FileError.of(origin, InvalidValueError("base", brief(name), ", ".join(robot_names()), step))
     base = _on_base(parse_mapping(preset_text(name), f"preset {name}"), origin)
-    del base["name"]  # the file needs its own name, because equal names would overwrite each other's files
+    del base["name"]  # the robot needs its own name, because files of results have the name of the robot
     assumed = {field: why for field, why in base.get("assumed", {}).items() if field not in data}
     own = data.get("assumed", {})
     return {**base, **data, "assumed": {**assumed, **own} if isinstance(own, dict) else own}
 
 
 def _winches(winches: Winch) -> dict[str, Any]:
-    """Keys of the winches' values. Values that belong to a winch with only a pulley are left out."""
+    """Keys and values of the winches for a file. Default values of `Winch` are left out."""
     plain = Winch().per_cable(len(winches.pulley_radius)).known()
     data = {
         key: field.tolist()
@@ -154,7 +154,7 @@ def _winches(winches: Winch) -> dict[str, Any]:
         data = {key: value for key, value in data.items() if key not in ("dead_cable", "dead_rise")}
     if "swivel_axis" in data:
         words = {tuple(axis): word for word, axis in SWIVEL_AXES.items()}
-        data["swivel_axis"] = [words[tuple(axis)] for axis in data["swivel_axis"]]
+        data["swivel_axis"] = [words.get(tuple(axis), axis) for axis in data["swivel_axis"]]
     return data
 
 

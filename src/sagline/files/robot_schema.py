@@ -1,4 +1,4 @@
-"""Keys and units of robot files. The constructor of the robot checks ranges and shapes."""
+"""Keys and units of robot files. Ranges and shapes are checked by the constructor of the robot."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sagline.robot.winch import Winch
 if TYPE_CHECKING:
     from sagline.interference.obstacles import Box, Capsule, Sphere
 
-_KINDS: Final = {  # kinds of obstacles, and the further keys that each kind allows
+_KINDS: Final = {  # kinds of obstacles, and the additional keys that each kind allows
     "box": ("center", "turned"),
     "capsule": ("radius",),
     "sphere": ("radius",),
@@ -38,7 +38,7 @@ Moment: TypeAlias = Annotated[Any, "kg*m^2"]  # moment or product of inertia
 SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # words for vertical directions
 
 
-class ObstacleEntry(YamlEntry):
+class _ObstacleEntry(YamlEntry):
     """Obstacle around the robot; `_KINDS` lists the allowed combinations of keys."""
 
     name: str
@@ -69,7 +69,7 @@ class ObstacleEntry(YamlEntry):
         return kind
 
     def solid(self, item: str) -> Box | Capsule | Sphere | None:
-        """Box, capsule or sphere of the entry. For a mesh: None; its values are checked, but its file is not read."""
+        """Box, capsule or sphere of the entry. None for a mesh: its values are checked, but its file is not read."""
         from sagline.files.mesh_file import meters  # imported here because most robot files have no scene
         from sagline.interference.obstacles import Box, Capsule, Sphere
 
@@ -102,7 +102,7 @@ class _RobotPart(YamlEntry):
     """Schema of a mapping in a robot file."""
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """Set of the given keys without the keys in `beside`. Raise an error if it is not one of the `ways`."""
+        """Set of the keys in the file without `beside`. Raise an error if the set is not one of `ways`."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):
@@ -116,7 +116,7 @@ class _RobotPart(YamlEntry):
 
 
 def _with_keys(units_of_keys: Mapping[str, str]) -> Any:
-    """Create the schema of a mapping with optional keys; `units_of_keys`: unit of each key."""
+    """Create the schema of a mapping with optional keys. `units_of_keys`: unit of each key."""
     keys: dict[str, Any] = {name: (Annotated[Any, unit], None) for name, unit in units_of_keys.items()}
     return create_model("_Keys", __base__=YamlEntry, **keys)
 
@@ -133,7 +133,7 @@ class _Cables(_RobotPart):
     expansion: Annotated[Any, "1/K"] = None
 
     def cable(self) -> Cable:
-        """Create the cables. Their stiffness follows from the given keys; the default section, from the diameter."""
+        """Create the cables. The stiffness follows from the given keys, and a missing section from the diameter."""
         ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
         beside = ["linear_density", "expansion"]
         if self.model_fields_set & {"axial_stiffness", "section_area"}:
@@ -181,14 +181,14 @@ def _vectors(value: object) -> object:
 
 
 class _Inertia(_RobotPart):
-    """Schema of the inertia about the center of mass: matrix, diagonal, elements, or solid body of the robot's mass."""
+    """Schema of the inertia about the center of mass: a matrix, its diagonal or elements, or a solid body."""
 
     matrix: Moment = None
     diagonal: Moment = None
     Ixx: Moment = None
     Iyy: Moment = None
     Izz: Moment = None
-    Ixy: Moment = 0.0  # this and the next two are elements of the matrix: negative products of inertia
+    Ixy: Moment = 0.0  # this key and the next two are elements of the matrix: negative products of inertia
     Ixz: Moment = 0.0
     Iyz: Moment = 0.0
     box: Meters = None
@@ -233,10 +233,10 @@ class _TestBox(YamlEntry):
 
 
 class _Deviations(_with_keys({name: what.unit for name, what in UNCERTAIN.items()})):  # type: ignore[misc]
-    """Schema of standard deviations of a robot's values: one number per field, per axis, or per value."""
+    """Schema of the standard deviations of a robot's values: one number per field, per axis or per value."""
 
     def of(self, robot: Robot, within: str) -> dict[str, Any]:
-        """Standard deviations in SI. A percentage is a share of the robot's value."""
+        """Standard deviations in SI. A percentage refers to the robot's value."""
         found = {}
         for key in (key for key in _Deviations.model_fields if key in self.model_fields_set):
             item, value = within + key, getattr(self, key)
@@ -248,7 +248,7 @@ class _Deviations(_with_keys({name: what.unit for name, what in UNCERTAIN.items(
 
 
 def _in_percent(value: object) -> bool:
-    """True if a value is a text in percent, or a list whose first element is one."""
+    """True if `value` is a text in percent, or a list that begins with such a text."""
     if isinstance(value, list):
         return bool(value) and _in_percent(value[0])
     return isinstance(value, str) and value.rstrip().endswith("%")
@@ -273,12 +273,12 @@ class _Calibration(YamlEntry):
     standard_error: _Deviations = Field(default_factory=_Deviations)
 
     def provenance(self, robot: Robot) -> Provenance:
-        """Create the provenance of the robot's numbers."""
+        """Create the record of the origin of the robot's values."""
         return Provenance(self.log, self.date, self.standard_error.of(robot, _ERROR), self.note)
 
 
 class RobotEntry(YamlEntry):
-    """Schema of a whole robot file. The keys are the fields of `Robot`, and so are the defaults."""
+    """Schema of a whole robot file. Keys and defaults are those of the fields of `Robot`."""
 
     name: str
     frame_anchors: Meters
@@ -302,7 +302,7 @@ class RobotEntry(YamlEntry):
     notes: str = ""
     tolerances: _Deviations | None = None
     calibration: _Calibration | None = None
-    scene: list[ObstacleEntry] = Field(default_factory=list)  # not a field of Robot; see sagline.files.robot_file
+    scene: list[_ObstacleEntry] = Field(default_factory=list)  # not a field of Robot; see sagline.files.robot_file
 
     def robot(self) -> Robot:
         """Create the robot that the file describes."""

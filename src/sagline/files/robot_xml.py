@@ -33,8 +33,8 @@ _STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # [kg/
 
 def read_xml(path: Path) -> Element:
     """Read the root element of an XML file."""
-    # Files that declare entities are refused, because an entity can grow without bound or refer to another file. A
-    # document type is skipped; its file is never opened
+    # Files that declare entities are refused, because an entity can grow without bound or refer to another file. The
+    # file of a document type is never opened
     data = read_bytes(path, _LIMIT)
     builder, parser = TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler = builder.start
@@ -44,7 +44,7 @@ def read_xml(path: Path) -> Element:
     parser.XmlDeclHandler = _check_encoding
     try:
         parser.Parse(data, True)
-    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two errors are for a wrong encoding
+    except (expat.ExpatError, LookupError, ValueError) as error:  # a wrong encoding causes the last two errors
         raise error_at_line(path, *_cause(error, data)) from None
     except _RefusedError as error:
         raise FileError(path, *error.args) from None
@@ -52,7 +52,7 @@ def read_xml(path: Path) -> Element:
 
 
 def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array:
-    """Read `count` numbers between blanks. Raise InvalidValueError with `item` and `unit` if one is wrong."""
+    """Read `count` numbers separated by blanks. If one is wrong, InvalidValueError names `item` and `unit`."""
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
     values = [number for number in found if number is not None and within_reach(number)]
     if len(found) != count or len(values) != count:
@@ -63,7 +63,7 @@ def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array
 
 
 def number_of_text(text: str | None, item: str, unit: str) -> float:
-    """Read one finite number. Raise InvalidValueError with `item` and `unit` if the number is wrong."""
+    """Read one finite number. If the text is not such a number, InvalidValueError names `item` and `unit`."""
     return float(numbers_of_text(text, 1, item, unit)[0])
 
 
@@ -80,7 +80,7 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
 def cables_of_file(
     density: Column, stiffness: Column, tool: str, assumed: dict[str, str], diameter: Sequence[float] | None = None
 ) -> Cable:
-    """Cables of a file. A value None is replaced by that of a 4 mm steel rope and noted in `assumed`."""
+    """Cables of a file. The value of a 4 mm steel rope replaces a value None, and is noted in `assumed`."""
     given = dict(zip(_STEEL_ROPE, (density, stiffness), strict=True))
     if missing := [name for name, values in given.items() if None in values]:
         assumed["cables"] = f"{' and '.join(missing)} of a 4 mm steel rope; the {tool} file gives none"
@@ -134,11 +134,11 @@ def _check_encoding(version: str, encoding: str | None, standalone: int) -> None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imported:
-    """Robot from a file of another program, and the data of the file that the robot cannot contain.
+    """Robot from a file of another program, and data of this file that the robot cannot contain.
 
     Attributes:
-        robot: The robot. `robot.assumed` lists the fields that the file does not give, with the reason. `robot.notes`
-            lists the lost data.
+        robot: The robot. `robot.assumed` lists each field that the file does not give, and the source of its value.
+            `robot.notes` lists the lost data.
         lost: Data of the file that the robot does not contain, one sentence each.
     """
 
@@ -147,5 +147,5 @@ class Imported:
 
 
 def with_losses(robot: Robot, lost: tuple[str, ...]) -> Imported:
-    """Combine a robot and its lost data. The data are added to the notes of the robot, and thus to its file."""
+    """Combine a robot and its lost data. The notes of the robot, and thus its file, then list the lost data."""
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

@@ -16,25 +16,16 @@ from sagline.dynamics.simulation.winches import SecondOrder
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.vibration import VibrationStatus
+from sagline.files import variables as v
 from sagline.files.netcdf import Format, attributes_with_units, index_coordinate, robot_of
-from sagline.files.variables import (
-    NONE,
-    SOMEWHERE,
-    STEP,
-    Quantity,
-    check_variables,
-    fields_of,
-    record_variables,
-    records_of,
-    variables_of_result,
-)
+from sagline.files.variables import NONE, SOMEWHERE, STEP, Quantity
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 TIME: Final = Quantity("time", (), "s", "time")
-# variables of every sample; a broken cable has no length and no nodes
+# variables of every sample; a broken cable has no length, and no nodes between its pieces
 SAMPLES: Final = (
     Quantity("position", ("axis",), "m", "position of the platform origin in the world", "pose.position"),
     Quantity(
@@ -50,13 +41,13 @@ SAMPLES: Final = (
     Quantity("energy_removed", (), "J", "energy of broken cables and dropped loads", "energy.removed"),
     Quantity("energy_error", (), "J", "error of the integrator since the start", "energy.error"),
 )
-# one value per cable, if known
+# one value per cable, in files that contain it
 LARGEST: Final = Quantity("largest_tension", ("cable",), "N", "largest tension at the frame end at any step", low=0.0)
 # variables of cables with mass
 NODES: Final = Quantity(
     "node_position", ("cable", "node", "axis"), "m", "position of the cables at their nodes", "nodes", SOMEWHERE
 )
-# variables of each event: attributes of an `Occurrence`
+# variables of each event, which are the attributes of `Occurrence`
 EVENT: Final = ("event",)
 INDEX: Final = "index of the cable or winch, from 0; -1 for the platform"
 EVENTS: Final = (
@@ -65,7 +56,9 @@ EVENTS: Final = (
     Quantity("event_cable", EVENT, "", INDEX, "cable", SOMEWHERE, values=int),
     Quantity("event_tension_before", EVENT, "N", "largest tension before the event", "tension_before", SOMEWHERE, 0.0),
     Quantity("event_tension_after", EVENT, "N", "largest tension after the event", "tension_after", SOMEWHERE, 0.0),
+    Quantity("event_limit", EVENT, "", "active limits of the drive", "limit", SOMEWHERE, values=str),
 )
+LIMITS: Final = ("", "torque", "speed", "torque and speed")
 CABLE_MASS: Final = ("none", "lumped", "modal")
 INTEGRATORS: Final = ("splitting", "runge-kutta", "exact")
 WINDINGS: Final = ("constant", "remembered")
@@ -74,7 +67,7 @@ WINCHES: Final = ("ideal", "robot", LAGGING)
 # numeric attributes and their units
 LAG: Final = {"bandwidth": "Hz", "damping_ratio": "1"}
 LOSSES: Final = {"loss_time": "s", "air_damping": "N s/m^2", "modal_damping": "1"}
-# events of a cable or winch, events of the platform, and all events
+# kinds of events of a cable or winch, kinds of events of the platform, and all kinds
 OF_CABLES: Final = ("break", "stall", "saturate", "slack")
 OF_PLATFORM: Final = ("drop", "pick up")
 OF_EITHER: Final = ("brake",)
@@ -90,20 +83,25 @@ def _check_simulation(data: Dataset, cables: int) -> None:
     time = data.variables[TIME.name].values
     sizes = {"cable": cables, ROWS: time.size, **{name: data.sizes.get(name, 0) for name in ("node", "event")}}
     nodes = (NODES,) if NODES.name in data.variables else ()
-    check_variables(data, (TIME, *SAMPLES, *nodes), sizes, (ROWS,))
+    v.check_variables(data, (TIME, *SAMPLES, *nodes), sizes, (ROWS,))
     if LARGEST.name in data.variables:
-        check_variables(data, (LARGEST,), sizes)
+        v.check_variables(data, (LARGEST,), sizes)
     _check_times(time)
     if bool(nodes) != (data.attrs["cable_mass"] != "none"):
         allowed = "given for cables with mass only"
         raise InvalidValueError(NODES.name, "given" if nodes else "not given", allowed, STEP)
     broken = np.full(cables, np.inf)
     if _has_events(data):
-        check_variables(data, EVENTS, sizes)
+        v.check_variables(data, _event_variables(data), sizes)
         broken = _check_events(data, time, cables)
     for name in ("length", *(one.name for one in nodes)):
         _check_gaps(name, data.variables[name].values, time[:, None] > broken)
     _check_balance(data)
+
+
+def _event_variables(data: Dataset) -> list[Quantity]:
+    """Variables of the events. Limits of drives are missing in older files, and in files without such events."""
+    return [one for one in EVENTS if one.place != "limit" or one.name in data.variables]
 
 
 def _has_events(data: Dataset) -> bool:
@@ -132,7 +130,7 @@ def _check_times(time: Array) -> None:
 
 
 def _check_events(data: Dataset, time: Array, cables: int) -> Array:
-    """Times at which cables break [s], infinite for cables that do not break."""
+    """Check the events, and return the time at which each cable breaks [s]; infinite if it does not break."""
     columns = (data.variables[f"event_{name}"].values.tolist() for name in ("time", "kind", "cable"))
     before, broken = float(time[0]), np.full(cables, np.inf)
     for k, (at, kind, cable) in enumerate(zip(*columns, strict=True)):
@@ -145,20 +143,26 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
         if not low <= cable <= high:
             allowed = f"{low} to {high} for {kind!r}" if low < high else f"{low} for {kind!r}"
             raise InvalidValueError(f"event_cable[{k}]", cable, allowed, STEP)
-        if cable != NONE and broken[cable] < np.inf:
+        again = kind == "break" and data.attrs["cable_mass"] == "lumped"  # a piece of a broken cable can break
+        if cable != NONE and broken[cable] < np.inf and not again:
             allowed = f"an unbroken cable: {cable} broke at {broken[cable]:g} s"
             raise InvalidValueError(f"event_cable[{k}]", f"{cable} at {at:g} s", allowed, STEP)
         if kind == "break":
-            broken[cable] = at
+            broken[cable] = min(broken[cable], at)
         before = at
+    for k, limit in enumerate(data.variables["event_limit"].values if "event_limit" in data.variables else ()):
+        choice(limit, f"event_limit[{k}]", LIMITS)
     return broken
 
 
 def _check_gaps(name: str, values: Array, gone: Any) -> None:
-    """Refuse values of broken cables, and missing values of intact cables; `gone`: flags (samples, cables)."""
+    """Refuse lengths of broken cables, and missing values of intact cables; `gone`: flags (samples, cables)."""
     missing = np.isnan(values)
     gone = gone.reshape(gone.shape + (1,) * (values.ndim - 2))
-    for index in np.argwhere(missing != gone)[:1].tolist():
+    wrong = missing != gone
+    if values.ndim > 2:  # a broken cable has nodes, except between its pieces
+        wrong &= ~gone | missing.any(axis=-1, keepdims=True)
+    for index in np.argwhere(wrong)[:1].tolist():
         k, cable = index[:2]
         there = "nan: its cable has broken" if gone[k, cable].all() else "a number: its cable has not broken"
         raise InvalidValueError(f"{name}{index}", f"{values[tuple(index)]:g}", there, STEP)
@@ -185,8 +189,8 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
         The simulation.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a simulation, or of a newer format. If it was
-            changed after it was written; digest, shapes, units and signs are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a simulation, or of a newer format. If the
+            file was changed after it was written: digest, shapes, units and signs are checked.
 
     Examples:
         >>> import sagline as sl
@@ -202,13 +206,14 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
 
 def _pack(simulation: Simulation) -> Dataset:
     """Create the data set of a simulation. Dimensions: time, cable and event; for cables with mass, node."""
-    variables = variables_of_result(simulation, (*SAMPLES, NODES), (ROWS,)) | variables_of_result(
+    variables = v.variables_of_result(simulation, (*SAMPLES, NODES), (ROWS,)) | v.variables_of_result(
         simulation, (LARGEST,)
     )
     if simulation.events:
-        variables |= record_variables(simulation.events, EVENTS)
+        some = any(event.limit for event in simulation.events)
+        variables |= v.record_variables(simulation.events, EVENTS if some else EVENTS[:-1])
     cables = simulation.robot.cable_count
-    coordinates = {"cable": index_coordinate("cable", cables), **variables_of_result(simulation, (TIME,), (ROWS,))}
+    coordinates = {"cable": index_coordinate("cable", cables), **v.variables_of_result(simulation, (TIME,), (ROWS,))}
     winches = simulation.winches
     lagging = isinstance(winches, SecondOrder)
     attributes = {
@@ -229,16 +234,17 @@ def _unpack(path: FilePath, data: Dataset) -> Simulation:
     """Create a simulation from a data set. Messages contain `path`."""
     robot = robot_of(path, data)
     _check_simulation(data, robot.cable_count)
-    attributes, found = data.attrs, fields_of(data, (TIME, *SAMPLES, NODES, LARGEST))
+    attributes, found = data.attrs, v.fields_of(data, (TIME, *SAMPLES, NODES, LARGEST))
     winches: Any = attributes["winches"]
     if winches == LAGGING:
         winches = SecondOrder(**{name: float(attributes[name]) for name in LAG})
     settings = {name: attributes[name] for name in ("cable_mass", "integrator", "winding")}
+    events = v.records_of(data, _event_variables(data)) if _has_events(data) else ()
     return Simulation(
         robot=robot,
         pose=Pose.from_quaternion(**found.pop("pose")),
         energy=EnergyBalance(**found.pop("energy")),
-        events=tuple(Occurrence(**row) for row in records_of(data, EVENTS)) if _has_events(data) else (),
+        events=tuple(Occurrence(**row) for row in events),
         step=float(attributes["step"]),
         winches=winches,
         damping=Damping(**{name: float(attributes[name]) for name in LOSSES}),
@@ -278,7 +284,7 @@ def _pack_frequencies(found: FrequencyMap) -> Dataset:
     attributes |= attributes_with_units(
         found.damping, {"loss_time": "s", "air_damping": "N s/m2", "modal_damping": None}
     )
-    variables = variables_of_result(found, FREQUENCIES, ("pose",))
+    variables = v.variables_of_result(found, FREQUENCIES, ("pose",))
     return FREQUENCY_MAP.dataset(f"Frequencies of {found.robot.name} over poses", found.robot, attributes, variables)
 
 

@@ -8,7 +8,7 @@ import io
 import os
 import re
 from array import array
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -24,13 +24,13 @@ from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 from sagline.files.reading import read_text
 
 TABLE_LIMIT: Final = 64.0  # largest size [MB], about half a million rows
-_TOO_LONG: Final = 100.0  # a length above this factor times the size of the object must be in mm
+_TOO_LONG: Final = 100.0  # a length without a unit that exceeds the size of the object by this factor must be in mm
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 _SHORT, _OF_CABLE = re.compile(r"([LC])([0-9]+)"), {"L": "length", "C": "count"}
 _PLAIN_ROW = re.compile(
     r"(?:[-+.0-9eE \t]*,|nan,)*"
-)  # a text with no other characters is converted by `float`, which is much faster
+)  # if a text has only these characters, the fast function `float` converts it
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?\s*")
 
 
@@ -55,32 +55,23 @@ class CsvTable:
     ) -> CsvTable:
         """Read a CSV text; the first row contains the names of the columns, `name` or `name [unit]`.
 
-        Columns are separated by commas, or by semicolons or tabs. Without commas between them, decimal commas are
+        Columns are separated by commas, or by semicolons or tabs. If no commas separate columns, decimal commas are
         allowed.
         """
-        mark = separator_of(text)
-        reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
         found: dict[str, float | None] = {}
         numbers, lines, header = array("d"), array("q"), 0
-        try:
-            for row in reader:
-                if not "".join(row).strip():  # a blank line, or a line of a spreadsheet with commas only
-                    continue
-                if not found:
-                    found, header = _factors(path, reader.line_num, row, units, strangers), reader.line_num
-                else:
-                    if mark != ",":
-                        row = [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row]
-                    numbers.extend(_numbers(path, reader.line_num, row, tuple(found), gaps))
-                    lines.append(reader.line_num)
-        except csv.Error as error:
-            raise line_error(path, reader.line_num, f"it is not CSV ({error})") from None
+        for line, row in csv_rows(path, text):
+            if not found:
+                found, header = _factors(path, line, row, units, strangers), line
+            else:
+                numbers.extend(_numbers(path, line, row, tuple(found), gaps))
+                lines.append(line)
         if not found:
             reason, step = f"no columns; allowed: {', '.join(units)}", "Give the names of the columns first."
             raise FileError(path, reason, step, item="columns")
         values = np.array(numbers).reshape(len(lines), len(found))
         factors = [1.0 if factor is None else factor for factor in found.values()]
-        with np.errstate(over="ignore"):  # values that are too large are reported later
+        with np.errstate(over="ignore"):  # a later check reports values that are too large
             columns = {name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))}
         plain = frozenset(name for name, factor in found.items() if factor is None)
         table = cls(path, columns, lines, header, plain)
@@ -91,7 +82,7 @@ class CsvTable:
         return table
 
     def check_columns(self, names: Iterable[str], hint: str) -> None:
-        """Refuse a table in which one of the columns `names` is missing; `hint`: end of the message."""
+        """Refuse a table in which one of the columns `names` is missing. `hint`: end of the message."""
         if missing := [name for name in names if name not in self.columns]:
             raise line_error(self.path, self.header, f"missing column {', '.join(missing)}{hint}")
 
@@ -101,22 +92,41 @@ class CsvTable:
             raise line_error(self.path, self.header, "no rows below the names of the columns; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Refuse a table with wrong rows. The message gives line, value, unit and allowed values of the first."""
+        """Refuse a table with wrong rows. The message gives line, value, unit and allowed values of the first one."""
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()
             raise line_error(self.path, self.lines[k], f"{item} is {value}; allowed: {allowed}")
 
     def refuse_millimeters(self, name: str, size: Array | float, whole: str) -> None:
-        """Refuse lengths without a unit if they exceed 100 times the `size` of the object [m], shape () or (rows,)."""
+        """Refuse lengths without a unit if they exceed 100 times the `size` [m] of the object, shape () or (rows,)."""
         if name in self.plain:
             far = self.columns[name] > _TOO_LONG * size
             allowed = f"lengths like {whole}; if these are millimeters, call the column {name} [mm]"
             self.refuse(far, name, self.columns[name], "m", allowed)
 
 
+def csv_rows(path: Path, text: str, above: int = 0) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of each row of a CSV text that is not blank, the header first; points for decimal commas.
+
+    `above`: number of lines of the file above the text.
+    """
+    mark, is_header = separator_of(text), True
+    reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
+    try:
+        for row in reader:
+            if not "".join(row).strip():  # a blank line, or a line with only commas, as a spreadsheet writes it
+                continue
+            if mark != "," and not is_header:
+                row = [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row]
+            is_header = False
+            yield above + reader.line_num, row
+    except csv.Error as error:
+        raise line_error(path, above + reader.line_num, f"it is not CSV ({error})") from None
+
+
 def separator_of(text: str) -> str:
-    """Separator of the columns of a CSV text: a comma. If the first row has no comma: a semicolon or a tab."""
+    """Separator of the columns of a CSV text: a comma, or, if the first row has no comma, a semicolon or a tab."""
     header = re.sub(r"\[.*?\]", "", next((line for line in text.split("\n") if line.strip()), "")).strip()
     return next((mark for mark in ",;\t" if mark in header), ",")
 
@@ -130,7 +140,7 @@ def column_of_cable(name: str) -> str:
 def _factors(
     path: Path, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
 ) -> dict[str, float | None]:
-    """Factor that converts each column to SI, by the name of the column; None without a unit."""
+    """For each column name, the factor that converts its numbers to SI; None for a column without a unit."""
     factors: dict[str, float | None] = {}
     for cell in header:
         found = _COLUMN.fullmatch(cell)
@@ -166,7 +176,7 @@ def _numbers(path: Path, line: int, row: list[str], names: tuple[str, ...], gaps
     if gaps:
         row = [cell if name not in gaps or cell.strip() else "nan" for name, cell in zip(names, row, strict=True)]
     if _PLAIN_ROW.fullmatch(",".join(row) + ","):
-        with contextlib.suppress(ValueError):  # after an error, slower code finds the wrong cell
+        with contextlib.suppress(ValueError):  # after an error, slower code searches the wrong cell
             return [float(cell) for cell in row]
     numbers = [plain_number(cell) for cell in row]
     if None in numbers:
@@ -183,7 +193,7 @@ def line_error(path: Path, line: int, reason: str) -> FileError:
     return found
 
 
-# for each kind of column: name of the other kind, and the next step if the file has that kind
+# for each kind of columns: the other kind, and the next step for the user if the file has the other kind
 _OTHERS: Final = {
     "length": ("count", "these are counts: add --counts"),
     "count": ("length", "these are lengths: omit --counts"),
@@ -195,10 +205,10 @@ def load_readings(
     file: os.PathLike[str] | str, kind: str, cable_count: int, size: float = np.inf
 ) -> tuple[Array | None, Array]:
     """Read a CSV file with one column per cable or encoder, and optionally the time; return times and readings."""
-    # Times [s], shape (N,), are None if the file has none. Readings have the shape (N, m). kind: "length" for columns
-    # length_0, length_1, ... [m], or "count" for count_0, ...; `L0` is another name of `length_0`. Units are in
-    # brackets, `time [s],length_0 [mm]`. cable_count: number of cables m of the robot; size: largest extent of the
-    # robot [m]; lengths that are a hundred times larger must have another unit
+    # The times [s], shape (N,), are None if the file has no column of times. Readings have the shape (N, m). kind:
+    # "length" for columns length_0, length_1, ... [m], or "count" for count_0, ...; `L0` is another name of `length_0`.
+    # Units are in brackets, `time [s],length_0 [mm]`. cable_count: number of cables m of the robot; size: largest
+    # extent of the robot [m]; lengths that are a hundred times larger must have another unit
     path = Path(file)
     names = _columns(kind, cable_count)
     other, hint = _OTHERS[kind]

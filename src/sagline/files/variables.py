@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 STEP = "Write the file again, because it was edited or damaged."
 NEWER = "Read it with a newer sagline."
-NONE: Final = -1  # value of a missing index or code
-# labels along all dimensions except rows and cable
+NONE: Final = -1  # number that means a missing index or code
+# names of the entries along all dimensions except rows and cable
 PARTS = {
     "axis": ("x", "y", "z"),
     "quaternion_part": ("x", "y", "z", "w"),
@@ -47,25 +47,30 @@ class Quantity(NamedTuple):
     parts: tuple[str, ...]  # dimensions after the dimensions of the rows (poses, or samples in time)
     unit: str  # unit in the file; "" for a plain number
     long_name: str  # description
-    # attribute of the result, with dots for nested attributes; if it is "" or ends with a dot, `name` follows
+    # attribute of the result, with dots for nested attributes; `name` is appended if it is "" or ends with a dot
     source: str = ""
-    # poses with values; in records, an integer with values SOMEWHERE is `NONE` elsewhere
+    # poses with values; in records, a missing integer of a quantity with values SOMEWHERE is `NONE`
     known: Known = EVERYWHERE
     low: float = -np.inf  # lowest value
     infinite: bool = False  # True if values may be infinite
-    codes: type[IntEnum] | None = None  # status type, if the values are codes
+    codes: type[IntEnum] | None = None  # enumeration of statuses, if the values are codes
     # type of values that are not codes: float, int, np.int8, bool or str
     values: type[float | int | np.int8 | bool | str] = float
 
     @property
     def place(self) -> str:
-        """Name of the result's attribute that has the values, with dots for nested attributes."""
+        """Attribute of the result that contains the values, with dots for nested attributes."""
         return self.source + self.name if self.source[-1:] in ("", ".") else self.source
 
     @property
     def type(self) -> np.dtype[Any]:
         """Type of the values in the file."""
         return np.dtype(np.int8 if self.codes is not None else object if self.values is str else self.values)
+
+    @property
+    def blank(self) -> int | str:
+        """Value in records without the quantity."""
+        return "" if self.values is str else NONE
 
     def of(self, result: Any) -> Any:
         """Values of the quantity in a result; None if the result has none, for example a plan without a proof."""
@@ -75,7 +80,7 @@ class Quantity(NamedTuple):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of the variable; the meanings of status codes follow the CF conventions."""
+        """Attributes of the variable, with the meanings of status codes as the CF conventions require."""
         found: dict[str, Any] = {"long_name": self.long_name}
         if self.unit:
             found["units"] = self.unit
@@ -95,10 +100,10 @@ def variables_of_result(result: Any, quantities: Iterable[Quantity], rows: tuple
 
 
 def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], width: int = 0) -> dict[str, Any]:
-    """Variables with one row per record. For lists, `width` is the second dimension. None is stored as `NONE`."""
+    """Variables with one row per record. For lists, `width` is the second dimension. None is stored as `one.blank`."""
     found: dict[str, Any] = {}
     for one in quantities:
-        values = [NONE if (value := one.of(record)) is None else value for record in records]
+        values = [one.blank if (value := one.of(record)) is None else value for record in records]
         shape = (len(records), width)[: len(one.parts)]
         found[one.name] = (one.parts, np.array(values, dtype=one.type).reshape(shape), one.attributes)
     return found
@@ -110,7 +115,7 @@ def values_of(data: Dataset, name: str) -> Any:
 
 
 def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
-    """Values of a data set, by attribute of the result. Nested attributes give nested mappings."""
+    """Mapping from attributes of the result to values of a data set. Nested attributes give nested mappings."""
     found: dict[str, Any] = {}
     for one in quantities:
         if one.name in data.variables:
@@ -123,13 +128,13 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
 
 
 def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
-    """Restore records from variables of `record_variables`. Integers that have values only SOMEWHERE may be None."""
+    """Restore records of `record_variables`. Integers and texts that have values only SOMEWHERE may be None."""
     columns: dict[str, list[Any]] = {}
     for one in quantities:
         values = data[one.name].values
         column = values.tolist() if values.ndim == 1 else [locked(row.copy()) for row in values]
-        if one.values is int and one.known is SOMEWHERE:
-            column = [None if value == NONE else value for value in column]
+        if one.values in (int, str) and one.known is SOMEWHERE:
+            column = [None if value == one.blank else value for value in column]
         columns[one.place] = column
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
@@ -141,11 +146,11 @@ def check_variables(
     rows: Iterable[str] = (),
     solved: Flags | None = None,
 ) -> None:
-    """Refuse a data set with labels or variables that contradict the declarations."""
+    """Refuse a data set if its labels or variables contradict the declared `quantities`."""
     # data: the data set
     # quantities: declared quantities, in the order of the checks
     # sizes: number of entries along each dimension without labels
-    # rows: dimensions before the dimensions of the declaration
+    # rows: dimensions of the rows, which precede the declared dimensions
     # solved: rows with a solution; None: all
     for name, labels in PARTS.items():
         if name in data.variables and list(data.variables[name].values) != list(labels):
@@ -163,7 +168,7 @@ def check_variables(
 
 
 def check_indices(data: Dataset, ranges: Mapping[str, tuple[int, int]]) -> None:
-    """Refuse indices out of range. Each of the `ranges` includes its first number, but not its second number."""
+    """Refuse indices outside their range. A range includes its first number, but not its second number."""
     for name, (low, high) in ranges.items():
         values = data.variables[name].values
         wrong = (values < low) | (values >= high)
@@ -176,7 +181,7 @@ def _check_form(quantity: Quantity, variable: Variable, wanted: Mapping[str, int
     found = dict(zip(map(str, variable.dims), variable.shape, strict=True))
     if list(found.items()) != list(wanted.items()):
         raise InvalidValueError(f"{quantity.name}: shape", _shape(found), _shape(wanted), STEP)
-    # texts may have different types; each text is checked later
+    # texts may have different types; a later check reads each text
     if quantity.values is not str and variable.dtype.newbyteorder("=") != quantity.type:
         raise InvalidValueError(f"{quantity.name}: type", variable.dtype, str(quantity.type), STEP)
     unit = variable.attrs.get("units", "")
@@ -204,7 +209,8 @@ def _check_codes(quantity: Quantity, variable: Variable) -> None:
 
 def _check_texts(quantity: Quantity, variable: Variable) -> None:
     for index, value in np.ndenumerate(variable.values):
-        if not isinstance(value, str) or not value or value != printable(value):
+        empty = value == "" and quantity.known is not SOMEWHERE
+        if not isinstance(value, str) or empty or value != printable(value):
             raise InvalidValueError(f"{quantity.name}{list(index)}", repr(value), "printable characters", STEP)
 
 

@@ -22,18 +22,18 @@ from sagline.robot.robot import Robot, box_inertia
 from sagline.robot.winch import Winch
 
 _AXES: Final = ("x", "y", "z")
-_FLATTEST: Final = 0.1  # smallest ratio of two edges of the assumed box; needed because all anchors may be in a plane
+_FLATTEST: Final = 0.1  # smallest ratio of two edges of the assumed box, because all anchors may be in a plane
 _VERSIONS: Final = ("0.31", "0.32")
-_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows writes 1.#INF
+_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows programs write 1.#INF
 
 
 def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
     """Read a robot file of WireX (version 0.31 or 0.32 of its format).
 
     WireX does not require material, inertia or limits. Missing values are assumed and listed in the robot's `assumed`.
-    Missing moments of inertia are set to the largest given moment, missing products of inertia to zero. If no inertia
-    is given, the platform is a box around its anchors. Only pulleys with a vertical swivel axis are read. Of a winch,
-    the largest force, the drum and the motor's inertia are read.
+    A missing moment of inertia is set to the largest given moment, and a missing product of inertia to zero. If no
+    inertia is given, the platform is a box around its anchors. Only pulleys with a vertical swivel axis are read. The
+    data read from a winch are its largest force, its drum and the inertia of its motor.
 
     Args:
         source: The `.wcrfx` file.
@@ -43,7 +43,7 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
         Imported: the robot, and the lost data.
 
     Raises:
-        FileError: If the file cannot be read, has another version, or does not describe a robot with one platform.
+        FileError: If the file cannot be read or has another version. If the robot does not have one platform.
 
     Examples:
         >>> import sagline as sl
@@ -108,7 +108,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
 
 
 def _optional(element: Element | None, key: str, item: str, unit: str) -> float | None:
-    """Number in the attribute `key`; None if missing, empty or infinite. Some programs write infinity for unknown."""
+    """Number in the attribute `key`. None if missing, empty or infinite (some programs write infinity for unknown)."""
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
         return None
@@ -126,7 +126,7 @@ def _point(chain: Element, tag: str, k: int) -> list[float]:
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
-    """The <cable> whose number (from 1) is the cable_id of `chain`. No id: the first. Empty if none exists."""
+    """The <cable> with the number (from 1) in cable_id of `chain`, by default the first; empty if it does not exist."""
     known = root.findall("cable")
     text = chain.get("cable_id", "1")
     if not known:
@@ -179,11 +179,11 @@ def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[
 
 
 def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
-    """Direction in which a cable enters its pulley: z axis of a11 to a33, by default up; None if it is inclined."""
+    """Direction in which a cable enters its pulley: z axis of the matrix a11 to a33 (default: up). None if inclined."""
     if base.get("a33") is None:
         return (0.0, 0.0, 1.0)
     upright = _required(base, "a33", item, "")
-    # for a vertical z axis, the last row and the last column are zero off the diagonal
+    # if the z axis is vertical, the last row and column are zero except on the diagonal
     sideways = max(abs(_optional(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
     return xml.vertical_axis(sideways, upright)
 
@@ -212,7 +212,7 @@ def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
 
 
 def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) -> tuple[list[float], list[float]]:
-    """Tension limits: lower from the cable; upper from the winch, otherwise from the cable's breaking load."""
+    """Tension limits: the lower from the cable, the upper from the winch or else the cable's breaking load."""
     low = [_optional(element, "minimum_load", "cable", "N") for element in materials]
     break_at = [_optional(element, "breaking_load", "cable", "N") or None for element in materials]
     winch = _optional(root.find("winch/cable"), "f_max", "winch: cable", "N") or None
@@ -234,7 +234,7 @@ def _center(platform: Element, assumed: dict[str, str]) -> list[float]:
 
 
 def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str]) -> Array:
-    """Symmetric matrix. One of two symmetric elements may be missing; if both are missing, a value is assumed."""
+    """Inertia matrix. One of two symmetric elements may be missing; if both are missing, a value is assumed."""
     matrix = np.full((3, 3), np.nan)
     tensor = platform.find("inertiatensor")
     for (i, row), (j, column) in product(enumerate(_AXES), repeat=2):
@@ -247,7 +247,7 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
     why = ["taken about the center of mass; the WireX format does not say about which point"]
     missing = [(i, j) for i, j in combinations_with_replacement(range(3), 2) if np.isnan(matrix[i, j])]
     products = [pair for pair in missing if pair[0] != pair[1]]
-    if len(products) not in (0, 3):  # one or two given products: a missing product is an error
+    if len(products) not in (0, 3):  # if one or two products of inertia are given, a missing product is an error
         key = "I" + "".join(_AXES[k] for k in products[0])
         raise InvalidValueError(f"inertiatensor: {key}", "missing", "a number in kg m^2", f"Add {key} to the file.")
     if missing:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import fields
 
-from sagline.cables.models import MODELS
+from sagline.cables.models import models_by_name
 from sagline.core.arguments import choice
 from sagline.core.arrays import locked, number
 from sagline.files.netcdf import Format, choice_attributes, choice_of
@@ -20,7 +20,7 @@ from sagline.files.robot_file import parse_robot
 from sagline.files.variables import Quantity, check_indices, check_variables, fields_of, variables_of_result
 from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere
 from sagline.robot.pose import Pose, PoseBox
-from sagline.tension.methods import METHODS
+from sagline.tension.methods import methods_by_name
 from sagline.workspaces import criteria
 from sagline.workspaces.criterion import Criterion
 from sagline.workspaces.levels import Nearest
@@ -38,7 +38,7 @@ _CRITERIA: Final[tuple[type[Criterion], ...]] = (
 )
 CRITERIA: Final = {kind.__name__: kind for kind in _CRITERIA}
 NODES: Final = ("x", "y", "z")  # coordinates of the nodes of the grid
-FINE: Final = ("fine_x", "fine_y", "fine_z")  # coordinates of the finer grid that separates components
+FINE: Final = ("fine_x", "fine_y", "fine_z")  # coordinates of the finer grid on which components are separated
 
 ACCELERATION: Final = ("acceleration_part",)
 QUANTITIES: Final = (
@@ -101,7 +101,7 @@ def _check_workspace(data: Dataset, cables: int) -> None:
 
 
 def _criteria_attributes(chosen: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Attributes of criteria, and variables of their obstacles. Raises InvalidValueError for unknown criteria."""
+    """Attributes for criteria, and variables for their obstacles. Raises InvalidValueError for unknown criteria."""
     attributes: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for k, one in enumerate(chosen):
@@ -109,9 +109,9 @@ def _criteria_attributes(chosen: Sequence[Criterion]) -> tuple[dict[str, Any], d
         attributes |= choice_attributes(key, one, CRITERIA)
         if isinstance(one, criteria.PositionError):
             del attributes[f"{key}_model"]
-            attributes |= choice_attributes(f"{key}_of_model", one.model, MODELS)
+            attributes |= choice_attributes(f"{key}_of_model", one.model, models_by_name())
         if isinstance(one, criteria.Clearance):
-            obstacles: Any = one.obstacles  # after the check, this is a tuple
+            obstacles: Any = one.obstacles  # the check has converted this field to a tuple
             attributes[f"{key}_obstacles"] = len(obstacles)
             for j, obstacle in enumerate(obstacles):
                 own, parts = _obstacle(f"{key}_obstacle_{j}", obstacle)
@@ -126,7 +126,7 @@ def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
         if data.attrs[key] == criteria.PositionError.__name__:
-            known["model"] = choice_of(path, data.attrs, f"{key}_of_model", MODELS)
+            known["model"] = choice_of(path, data.attrs, f"{key}_of_model", models_by_name())
         if data.attrs[key] == criteria.Clearance.__name__:
             count = int(data.attrs[f"{key}_obstacles"])
             known["obstacles"] = tuple(_obstacle_of(data, f"{key}_obstacle_{j}") for j in range(count))
@@ -135,7 +135,7 @@ def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
 
 
 def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Texts and numbers of an obstacle as attributes, and its arrays as variables."""
+    """Convert an obstacle: its texts and numbers to attributes, and its arrays to variables."""
     attributes: dict[str, Any] = {key: type(obstacle).__name__}
     variables: dict[str, Any] = {}
     for field in fields(type(obstacle)):
@@ -167,8 +167,8 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
         The workspace.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a workspace, or of a newer format. If it was
-            changed after it was written; digest, shapes and units are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a workspace, or of a newer format. If the
+            file was changed after it was written: digest, shapes and units are checked.
 
     Examples:
         >>> import sagline as sl
@@ -188,8 +188,8 @@ def _pack(space: Workspace) -> Dataset:
         "need": space.orientations.need,
         "hull": space.hull,
         "open_faces": ", ".join(space.open_faces),
-        **choice_attributes("model", space.model, MODELS),
-        **choice_attributes("tension", space.tension, METHODS),
+        **choice_attributes("model", space.model, models_by_name()),
+        **choice_attributes("tension", space.tension, methods_by_name()),
     }
     if space.moment_arm is not None:
         attributes |= {"moment_arm": space.moment_arm, "moment_arm_units": "m"}
@@ -205,7 +205,7 @@ def _pack(space: Workspace) -> Dataset:
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
     """Create a workspace from a data set. Messages contain `path`."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
-    if "component_separate" not in data.variables:  # a file of an older sagline, without proofs
+    if "component_separate" not in data.variables:  # a file of an older version of sagline has no proofs
         data = data.assign(component_separate=("component", np.zeros(data.sizes["component"], dtype=np.bool_)))
     _check_workspace(data, robot.cable_count)
 
@@ -219,8 +219,8 @@ def _unpack(path: FilePath, data: Dataset) -> Workspace:
         wrenches=WrenchSet(**found.pop("wrenches")),
         orientations=Orientations._of(found.pop("orientations")["quaternion"], attributes["need"]),
         criteria=_criteria_of(path, data),
-        model=choice_of(path, data.attrs, "model", MODELS),
-        tension=choice_of(path, data.attrs, "tension", METHODS),
+        model=choice_of(path, data.attrs, "model", models_by_name()),
+        tension=choice_of(path, data.attrs, "tension", methods_by_name()),
         moment_arm=None if arm is None else float(arm),
         hull=attributes.get("hull", "exact"),
         unit=attributes["volume_units"],

@@ -1,8 +1,8 @@
 """Atomic file writing, names of files, and JSON text.
 
 A new file is written next to its target and then renamed in one step, so that the target is always complete. Folders,
-devices, pipes, sockets and links are refused as targets. Links among the parent folders are followed. The new file has
-the permissions of the replaced file. Other hard links to the replaced file keep the old content.
+devices, pipes, sockets and links are refused as targets. The parent folders may be links. The new file has
+the permissions of the replaced file. If the replaced file had other hard links, they keep the old content.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ import numpy as np
 from sagline.core.errors import FileError, is_seen
 from sagline.files.reading import check_regular
 
-LONGEST = 120  # [bytes], so that a name with suffix is below the common limit of 255
+LONGEST = 120  # longest name [bytes]; with a suffix, it is below the common limit of 255
 UNNAMED = "robot"
-LOCK = "lock"  # locked while the folder is in use; the system releases the lock at the end of the process
+LOCK = "lock"  # file that is locked while the folder is in use; the system releases the lock when the process ends
 TRIES = 100
 _finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
-_OTHERS = re.compile(r"[^\n -~]+")  # not printable ASCII, not line feed; json escapes control characters
+_OTHERS = re.compile(r"[^\n -~]+")  # neither printable ASCII nor a line feed; json escapes control characters
 PREFIX, SUFFIX = ".sagline-", ".part"
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", re.IGNORECASE)  # reserved names on Windows
 
 
 def file_stem(name: str, *words: str) -> str:
-    """File name for a robot, without a suffix. It is never empty, hidden, too long, a path, or a device.
+    """File name for a robot, without a suffix. The name is never empty, hidden, too long, a path, or a device.
 
     Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
     other characters or is too long, eight digits of its digest are added, so that two robots never have the same files.
@@ -70,7 +70,7 @@ def staging(folder: Path) -> Iterator[Path]:
 
 
 def _new_place(folder: Path) -> tuple[Path, int]:
-    """Create a locked folder. If another process removes it before it is locked, create another one."""
+    """Create a locked folder. If another process removes the folder before it is locked, create another folder."""
     for _ in range(TRIES):
         place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
         try:
@@ -84,7 +84,7 @@ def _new_place(folder: Path) -> tuple[Path, int]:
 
 
 def _remove_if_left(place: Path) -> None:
-    """Remove a folder that no process uses; a folder that cannot be removed remains."""
+    """Remove a folder if no process uses it. A folder that cannot be removed is ignored."""
     with suppress(OSError):
         if place.is_symlink():
             return
@@ -118,7 +118,7 @@ def try_lock(lock: int, *, if_unknown: bool) -> bool:
 
 @contextmanager
 def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
-    """Provide a temporary file that replaces a file when the block ends without an error."""
+    """Provide a temporary file, which replaces `file` when the block ends without an error."""
     # The block writes to a new file in the folder of the target. At its end the new file is flushed to the disk and
     # renamed in one step. If the block fails or is interrupted, the new file is removed and the target is unchanged.
     target = check_file(file)
@@ -128,7 +128,7 @@ def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
 
 @contextmanager
 def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int = 0) -> Iterator[tuple[Path, ...]]:
-    """Provide temporary files that together replace files of a folder when the block ends without an error."""
+    """Provide temporary files, which together replace files of a folder when the block ends without an error."""
     targets = [check_file(Path(folder) / name) for name in names]
     try:
         with staging(Path(folder)) as place:
@@ -140,7 +140,7 @@ def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int
             for part, target in zip(parts, targets, strict=True):
                 _finish(part, target)
             old, new = [str(part) for part in parts], [str(target) for target in targets]
-            list(map(os.replace, old, new))  # this loop runs in C, so that Ctrl-C cannot interrupt it between two names
+            list(map(os.replace, old, new))  # this loop runs in C: Ctrl-C cannot interrupt it between two names
     except OSError as error:
         target = _target_of(error, targets)
         raise FileError(target, f"cannot be written ({_reason(error)})", _next_step(target)) from error
@@ -175,7 +175,7 @@ def finished_files() -> Iterator[list[Path]]:
 
 
 def check_file(file: os.PathLike[str] | str) -> Path:
-    """Refuse a path at which no file can be written; nothing is changed."""
+    """Refuse `file` if no file can be written at this path. Nothing is changed."""
     target = Path(file)
     try:
         mode = target.lstat().st_mode
@@ -193,14 +193,14 @@ def check_file(file: os.PathLike[str] | str) -> Path:
 
 
 def check_files(folder: os.PathLike[str] | str, names: Iterable[str]) -> None:
-    """Refuse files that cannot be written to a folder; nothing is changed."""
+    """Refuse `folder` and `names` if one of the files cannot be written there. Nothing is changed."""
     check_folder(folder)
     for name in names:
         check_file(Path(folder) / name)
 
 
 def check_folder(folder: os.PathLike[str] | str) -> None:
-    """Refuse a folder in which no files can be written; it is not created."""
+    """Refuse a folder in which no files can be written. A missing folder is not created."""
     path = Path(folder).absolute()
     nearest = next(place for place in (path, *path.parents) if os.path.lexists(place))
     if not nearest.is_dir():
@@ -244,13 +244,13 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _target_of(error: OSError, targets: Sequence[Path]) -> Path:
-    """Find the target to which an error belongs, from the temporary file in the error. Unknown: the first target."""
+    """Target to which an error belongs, found from the temporary file in the error; the first target if unknown."""
     name = Path(str(error.filename)).name.removesuffix(SUFFIX)
     return targets[int(name)] if name.isdecimal() and int(name) < len(targets) else targets[0]
 
 
 def _reason(error: Exception) -> str:
-    reason: str = getattr(error, "strerror", None) or str(error)  # errors of HDF5 have a text without an error number
+    reason: str = getattr(error, "strerror", None) or str(error)  # errors of HDF5 have only a text, no error number
     return next(iter(reason.splitlines()), type(error).__name__)
 
 
@@ -278,6 +278,6 @@ def plain(what: Any) -> Any:
 
 
 def json_text(what: Any) -> str:
-    """JSON document of data that `plain` accepts. Control characters are escaped, to be safe in a terminal."""
+    """JSON document of data that `plain` accepts. Control characters are escaped, because a terminal may obey them."""
     text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
     return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

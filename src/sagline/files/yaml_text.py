@@ -38,18 +38,18 @@ class YamlEntry(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
+    @classmethod
+    def units(cls) -> dict[str, str]:
+        """Units of the quantities of the schema, by key."""
+        return {key: str(field.metadata[0]) for key, field in cls.model_fields.items() if field.metadata}
+
     def si(self, key: str, within: str = "") -> Any:
-        """Quantity of the key `key` in SI units; `within` precedes the key in messages."""
+        """Quantity of `key` in SI units. In messages, `within` precedes the key."""
         return in_si(getattr(self, key), type(self).model_fields[key].metadata[0], within + key)
 
     def given(self, within: str = "") -> dict[str, Any]:
-        """Quantities in SI units of all keys that the file contains."""
-        return {key: self.si(key, within) for key in units_of(type(self)) if key in self.model_fields_set}
-
-
-def units_of(schema: type[YamlEntry]) -> dict[str, str]:
-    """Units of the quantities of a schema, by key."""
-    return {key: str(field.metadata[0]) for key, field in schema.model_fields.items() if field.metadata}
+        """Quantities of all keys in the file, in SI units."""
+        return {key: self.si(key, within) for key in self.units() if key in self.model_fields_set}
 
 
 Schema = TypeVar("Schema", bound=YamlEntry)
@@ -61,7 +61,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
         return schema.model_validate(data)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
-    # misspelt keys are reported first, because each also causes a missing key
+    # misspelt keys are reported first, because each of them is also reported as a missing key
     first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
     key, found, allowed, next_step = _explain(first, schema)
     refused = FileError(origin, f"{key} is {found}{allowed and f'; allowed: {allowed}'}", next_step, item=key)
@@ -85,6 +85,8 @@ def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, 
         case "model_type":
             known = list(_at(schema, where).model_fields)
             return key, found, f"keys {', '.join(known)}", "Give a mapping with keys."
+        case "dict_type":
+            return key, found, "a mapping with keys", f"Correct {key}."
         case "string_type":
             return key, found, "text", f'Put it in quotes: {key}: "..."'
         case _:
@@ -93,8 +95,8 @@ def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, 
 
 
 def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry]:
-    """Find the schema of a mapping inside the file, from its path; list indices have no effect."""
-    for part in (part for part in where if isinstance(part, str)):
+    """Schema of the mapping at the path `where` of the file. Indices and free keys in the path have no effect."""
+    for part in (part for part in where if isinstance(part, str) and part in schema.model_fields):
         kind = schema.model_fields[part].annotation
         schema = next(k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, YamlEntry))
     return schema
@@ -126,7 +128,7 @@ def dump_mapping(data: Mapping[str, Any]) -> str:
 
 
 def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
-    """Reason why a text is not YAML, and the next step. If the message of PyYAML is clear, the reason contains it."""
+    """Reason why a text is not YAML, and the next step. The reason contains the message of PyYAML if it is clear."""
     mark, problem = error.problem_mark or error.context_mark, str(error.problem or error.context)
     index, place = (len(text), "") if mark is None else (mark.index, f"line {mark.line + 1}: ")
     if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
@@ -154,7 +156,7 @@ def _reason(error: Exception, text: str) -> str:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Reader of texts, plain numbers, null, lists and mappings, with unique keys and limited levels and values."""
+    """Reader of texts, plain numbers, null, lists and mappings. Keys are unique; levels and values are limited."""
 
     yaml_constructors: ClassVar[dict[Any, Any]] = {}
 
@@ -181,7 +183,8 @@ class _PlainLoader(yaml.SafeLoader):
         return _tag_of(kind, value, implicit)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        # duplicate keys are refused here, because PyYAML silently keeps the last of them; it refuses a wrong !!map
+        # duplicate keys are refused here, because PyYAML silently keeps only the last; PyYAML itself refuses a wrong
+        # !!map
         keys = [key for key, _ in node.value] if node.id == "mapping" else []
         seen = set()
         for key in (key for key in keys if isinstance(key, yaml.ScalarNode)):
@@ -193,7 +196,7 @@ class _PlainLoader(yaml.SafeLoader):
     def construct_number(self, node: yaml.ScalarNode) -> object:
         text = self.construct_scalar(node)
         number = plain_number(text)
-        if number is None:  # code that uses the text later reports the error
+        if number is None:  # the code that uses the text reports the error later
             return text
         return int(text) if text.lstrip("+-").isdecimal() else number
 
@@ -208,7 +211,7 @@ class _PlainDumper(yaml.SafeDumper):
 
 def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
     """Choose the tag of a value without an explicit tag."""
-    if kind is yaml.ScalarNode and value is not None and implicit[0]:  # a value without quotes and without a tag
+    if kind is yaml.ScalarNode and value is not None and implicit[0]:  # the value has neither quotes nor a tag
         if value in _WORDS:
             return _WORDS[value]
         if plain_number(value) is None:
@@ -218,7 +221,7 @@ def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """Numbers of values and levels of a node whose aliases are expanded; `known`: cache of these numbers."""
+    """Numbers of values and of levels of a node after its aliases are expanded. `known`: cache of these numbers."""
     if id(node) in known:
         found = known[id(node)]
         if found is None:

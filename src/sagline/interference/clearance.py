@@ -31,7 +31,7 @@ BLOCK = 1024  # poses per block
 
 
 class ClearanceRows:
-    """Measurement of distances at batches of poses; data that do not depend on the pose are prepared only once.
+    """Measurement of distances at batches of poses. Data that do not depend on the pose are prepared only once.
 
     Attributes:
         pairs: Names and indices of the measured pairs, and the omitted pairs.
@@ -57,17 +57,17 @@ class ClearanceRows:
         self._still = locked(np.array(still).reshape(-1, shapes.COLUMNS))
         self._meshed = None
         if len(self.pairs.with_mesh):
-            from sagline.interference.meshed import Meshed  # needs python-fcl
+            from sagline.interference.meshed import Meshed  # this class needs python-fcl
 
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> tuple[Array, Array, Array]:
-        """Distances of every pair at every pose. With `together`, only the smallest distance of each pose is exact."""
+        """Distances of every pair at every pose. If `together`, only the smallest distance of each pose is exact."""
         # value [m] (N, P), proved lower bound [m] (N, P), nearest points [m] (N, P, 2, 3); NaN without tensions
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3))
-        known, memory = len(self.pairs.by_kernel), work_arrays_for_pieces()  # new arrays, because of threads
+        known, memory = len(self.pairs.by_kernel), work_arrays_for_pieces()  # new for each thread
         for part in blocks(count, BLOCK):
             own = state if single else state[part]
             moving = self._moving(own)
@@ -94,10 +94,10 @@ class ClearanceRows:
         return np.where(lost, np.nan, found.min(axis=1)), pair
 
     def of_platform(self, pose: Pose, half: Array) -> Array:
-        """Upper bound (N,) [m] of the platform's distance from obstacles at all positions up to `half` (3,) [m] away.
+        """Upper bound (N,) [m] of the platform's distance from obstacles for all positions in a box around `pose`.
 
-        The platform is replaced by a box that is smaller by `half`. At each of these positions, this box is inside the
-        platform. Meshes are omitted.
+        half: half edges of the box, (3,) [m]. The platform is replaced by a box that is smaller by `half`. At each
+            position, the smaller box is inside the platform. Meshes are omitted.
         """
         first = len(self.pairs.parts)
         pairs = self.pairs.by_kernel
@@ -114,7 +114,7 @@ class ClearanceRows:
         return np.asarray(out[0].min(axis=1) + beyond)
 
     def _moving(self, state: Equilibrium) -> Array:
-        """Rows of the moving bodies: parts of cables, and the platform. A mesh or no platform gets a placeholder."""
+        """Rows of the moving bodies: cable parts and platform. No platform, or a mesh, is replaced by a placeholder."""
         diameter = state.cables.cable.diameter
         known = np.zeros(1) if diameter is None else 0.5 * diameter
         cables = cable_rows(state, known if self._radius is None else self._radius)
@@ -122,7 +122,7 @@ class ClearanceRows:
         parts = rows_of_parts(cables.reshape(*lengths.shape, -1), lengths, self.pairs.parts, self._from_anchor)
         box = self._platform if isinstance(self._platform, Box) else Box(np.ones(3))
         rows = np.concatenate((parts, box_rows(box, state.pose).reshape(-1, 1, shapes.COLUMNS)), axis=1)
-        return locked(np.ascontiguousarray(rows))  # a read-only array would cause a second compilation
+        return locked(np.ascontiguousarray(rows))  # a read-only array would cause a second compilation of the kernel
 
 
 def _box_row(one: Box | Mesh) -> Array:
@@ -131,7 +131,7 @@ def _box_row(one: Box | Mesh) -> Array:
 
 
 def _platform_of(robot: Robots) -> Box | None:
-    """Box of the platform's size around its anchors. None if the size is unknown. Different platforms are refused."""
+    """Box of the platform's size around its anchors; None if unknown. Robots with unequal platforms are refused."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
         if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
@@ -150,7 +150,7 @@ def _alike(one: Array | None, other: Array | None) -> bool:
 NO_TENSIONS = "no tensions are known, so that the cables have no shape; use a feasible pose"
 NOTHING = "nothing is measured"
 _SHOWN = 8  # largest number of printed pairs per pose, and of printed lines about omitted pairs
-# largest extent of a mesh, relative to the robot; the unit of a larger mesh is probably the millimeter
+# largest extent of a mesh, relative to the robot; the unit of a larger mesh is probably wrong
 _TOO_LARGE = 100.0
 _NUMBERS = 9  # number of values per pair and pose: distance, lower bound and two points
 
@@ -191,7 +191,7 @@ class Clearances(Result, Tabular):
 
     @property
     def between(self) -> Any:
-        """Names of the nearest pair, or of the nearest pair at each of N poses. If no distance is known: a sentence."""
+        """Names of the nearest pair, at each of N poses. If no distance is known, a sentence."""
         return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
 
     def __str__(self) -> str:
@@ -258,9 +258,9 @@ def clearance(
             robot's cables, or 0 if the diameter is unknown.
         platform: Shape of the platform in the platform frame. None: a box of the robot's platform_size around its
             anchors, if this size is known.
-        from_anchor: Length of cable next to an anchor that the measurement ignores [m], > 0. It applies to two cables
-            with a common anchor, to cables and platform, and to obstacles near frame anchors. None: pairs of two cables
-            with a common anchor, and pairs of a cable and the platform, are omitted and listed in `left_out`.
+        from_anchor: Length of cable next to an anchor that the measurement ignores [m], > 0. The length applies to two
+            cables with a common anchor, to cables and platform, and to obstacles near frame anchors. None: pairs of two
+            cables with a common anchor, and pairs of a cable and the platform, are omitted and listed in `left_out`.
 
     Returns:
         Clearances.
@@ -297,7 +297,7 @@ def clearance(
 
 
 def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
-    """The checked obstacles `given` as a tuple. A mesh that is 100 times larger than `robot` is refused."""
+    """Check the obstacles `given`, and return a tuple. A mesh that is 100 times larger than `robot` is refused."""
     found = obstacles_of(given, "obstacles")
     for one in found:
         if isinstance(one, Mesh):
@@ -306,7 +306,7 @@ def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
 
 
 def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
-    """The obstacle or obstacles `given`, checked, as a tuple."""
+    """Check `given`, one obstacle or several, and return a tuple."""
     some = (given,) if isinstance(given, Obstacle) else given
     several = isinstance(some, Sequence) and not isinstance(some, str)
     wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]

@@ -1,8 +1,8 @@
 """Least distances from meshes, with python-fcl. Distances of cables follow by branch and bound over cable pieces.
 
 fcl computes the distance between triangles, and between triangles and a segment, with full precision. The bulge of a
-cable piece is an upper bound of its distance from its chord. A box is twelve triangles and a sphere is a segment of
-zero length, because the boxes and capsules of fcl are accurate only to 1e-7.
+cable piece is an upper bound of the distance between the piece and its chord. A box is represented by twelve triangles
+and a sphere by a segment of zero length, because the boxes and capsules of fcl are accurate only to 1e-7.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from sagline.robot.pose import Pose
 
 Form = Box | Capsule | Sphere | Mesh
 MISSING: Final = 'Meshes need python-fcl, which is not installed. Run: pip install "sagline[workspace]"'
-ROUNDING: Final = 1e-12  # rounding error that is subtracted from a lower bound, relative to the coordinates
+ROUNDING: Final = 1e-12  # rounding error, relative to the coordinates, that is subtracted from a lower bound
 _PIECES: Final = 4000  # largest number of examined cable pieces per distance
-_SEARCHES: Final = 60  # iterations that give the nearest point of a cable with full precision
+_SEARCHES: Final = 60  # sufficient number of iterations for the nearest point of a cable with full precision
 # corners of a box as signs of its half edges, and its triangles as indices of corners
 _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
 _FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
@@ -57,7 +57,7 @@ _Nearest = tuple[float, float, Array, Array]
 
 
 class Meshed:
-    """Pairs of two bodies, at least one of which is a mesh. The bodies are prepared only once."""
+    """Pairs of bodies with at least one mesh. The bodies are prepared only once."""
 
     def __init__(self, pairs: Pairs, forms: tuple[Form | None, ...], precision: float) -> None:
         """Prepare the bodies `forms`: the platform, or None, then the obstacles in the order of their indices."""
@@ -68,7 +68,7 @@ class Meshed:
         self._known: dict[tuple[int, bytes], bool] = {}
 
     def measure(self, pose: Pose, moving: Array, least: Array | None, out: tuple[Array, Array, Array]) -> None:
-        """Fill the distances of all pairs at every pose. Pairs beyond the distance `least` (N,) [m] may be skipped."""
+        """Fill the distances of all pairs at every pose. Pairs farther apart than `least` (N,) [m] may be skipped."""
         turns, places = pose.matrix.reshape(-1, 3, 3), np.atleast_2d(pose.position)
         value, low, nearest = out
         for n in range(len(moving)):
@@ -128,7 +128,7 @@ class Meshed:
             point = at[of][0] @ point + at[of][1]
         if number in at:
             point = at[number][0].T @ (point - at[number][1])
-        key = number, point.tobytes()  # frame ends of cables do not move
+        key = number, point.tobytes()  # the frame end of a cable does not move
         if key not in self._known:
             if len(self._known) > 1000:
                 self._known.clear()
@@ -181,7 +181,7 @@ class Meshed:
 
 
 def package() -> ModuleType:
-    """Module python-fcl, loaded at the first use. If it is missing, the error names the command that installs it."""
+    """Module python-fcl, loaded at the first use. Without the module, the error names the command that installs it."""
     try:
         import fcl
     except ImportError:
@@ -215,7 +215,7 @@ def _polished(
     nearest: tuple[float, float, Array, Array],
     row: Array,
 ) -> tuple[float, float, Array, Array]:
-    """Nearest point of a cable. The search starts at `nearest`, with golden sections and parabolas (Brent's method)."""
+    """Nearest point of a cable by Brent's method (golden sections and parabolas), which starts at `nearest`."""
     from scipy.optimize import minimize_scalar
 
     reach = 0.02 * float(row[shapes.LAST] - row[shapes.FIRST])

@@ -25,7 +25,7 @@ ROUNDING: Final = 1e-14  # tolerance for products of unit vectors
 
 
 def _rotation(value: ArrayLike, item: str) -> Array:
-    """The checked rotation matrix `value`. If its errors exceed rounding, the nearest rotation matrix replaces it."""
+    """Check the rotation matrix `value`. If its errors exceed rounding, the nearest rotation matrix replaces it."""
     matrix = exactly(value, item, "", (3, 3))
     nearest = Pose(np.zeros(3), matrix).matrix
     return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
@@ -42,7 +42,7 @@ class Box(Result):
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If an edge is not positive, or `orientation` is not a rotation.
+        InvalidValueError: If an edge is not positive. If `orientation` is not a rotation.
 
     Examples:
         >>> import sagline as sl
@@ -75,7 +75,7 @@ class Capsule(Result):
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If the radius is negative, or an end is not a point.
+        InvalidValueError: If the radius is negative. If an end is not a point.
 
     Examples:
         >>> import sagline as sl
@@ -107,7 +107,7 @@ class Sphere(Result):
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If the radius is negative, or the center is not a point.
+        InvalidValueError: If the radius is negative. If the center is not a point.
 
     Examples:
         >>> import sagline as sl
@@ -131,8 +131,8 @@ def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:
     """Twelve beams with round ends at the edges of a robot's frame.
 
     The frame is the same as in drawings: a box with the robot's frame_size, whose top is at the highest anchors. If
-    frame_size is unknown, the frame is the box around the anchors and down to the floor. Frame anchors are on the frame
-    or near it. Therefore exclude the first part of each cable with the argument `from_anchor` of `clearance`.
+    frame_size is unknown, the frame is the box around the anchors, extended down to the floor. Frame anchors are on the
+    frame or near it. Therefore exclude the first part of each cable (argument `from_anchor` of `clearance`).
 
     Args:
         robot: The robot.
@@ -170,13 +170,13 @@ _AT_ONCE: Final = 1 << 19  # largest number of triangles times points in one ste
 
 
 def _as_faces(value: ArrayLike) -> Indices:
-    """Return faces unchanged: a converter that only declares the type of the argument."""
+    """Return `value` unchanged. This converter only declares the type of the argument."""
     return value  # type: ignore[return-value]
 
 
 @frozen(eq=False, repr=False, weakref_slot=False)
 class Mesh(Result):
-    """A closed surface of triangles, at rest in the world; for a platform, in the platform frame.
+    """A closed surface of triangles, at rest in the world, or at rest in the platform frame for a platform.
 
     The enclosed volume is solid. If all triangles face inward, the outside is solid instead, and the enclosed volume is
     free.
@@ -189,7 +189,7 @@ class Mesh(Result):
 
     Raises:
         InvalidValueError: If a face has an invalid corner index. If the number of faces is below 4 or above a million.
-            If the surface is not closed; the message gives its extent.
+            If the surface is not closed: the message gives its extent.
 
     Examples:
         >>> import sagline as sl
@@ -291,7 +291,7 @@ def _faces(given: Any, corners: int) -> Indices:
 
 
 def _open_edges(faces: Indices) -> int:
-    """Number of edges of `faces` without a neighboring triangle that has the same edge in the opposite direction."""
+    """Number of open edges: no neighboring triangle has the same edge in the opposite direction."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = int(faces.max()) + 1
     ways = np.concatenate((start * count + end, end * count + start))

@@ -18,7 +18,7 @@ from sagline.robot.pose import Pose
 
 
 class _CablePart(NamedTuple):
-    """Measured part of a cable: the whole cable, or the cable without a part at one end or at both ends."""
+    """Measured part of a cable: the whole cable, or the cable without a length at one end or at both ends."""
 
     cable: int
     off_frame: bool = False
@@ -26,7 +26,7 @@ class _CablePart(NamedTuple):
 
 
 def cable_rows(state: Equilibrium, radius: Array) -> Array:
-    """Rows of cables that start at their exit points, NaN for a cable without tension. `radius`: (m,) or (N, m) [m]."""
+    """Rows of the cables from their exit points on, NaN for a cable without tension. `radius`: (m,) or (N, m) [m]."""
     cables, ends = state.cables, _platform_ends(state)
     exits = state.exit_point
     out = np.zeros((*cables.shape, shapes.COLUMNS))
@@ -61,7 +61,7 @@ def _platform_ends(state: Equilibrium) -> Array:
 
 
 def rows_of_parts(cables: Array, lengths: Array, parts: tuple[_CablePart, ...], left_out: float) -> Array:
-    """Rows (N, len(parts), COLUMNS) of `parts` of the cables; `left_out`: omitted unstrained length at an end [m]."""
+    """Rows (N, len(parts), COLUMNS) of `parts` of the cables. `left_out`: unstrained length omitted at an end [m]."""
     out = cables[:, [part.cable for part in parts]]
     for k, part in enumerate(parts):
         share = np.minimum(left_out / lengths[:, part.cable], 0.5 if part.off_frame and part.off_platform else 1.0)
@@ -100,12 +100,12 @@ def box_rows(box: Box, pose: Pose | None = None) -> Array:
 Obstacle = Box | Capsule | Sphere | Mesh
 
 PLATFORM: Final = "platform"
-_SAME = 1e-9  # relative to the robot's extent; anchors with a smaller distance count as one anchor
+_SAME = 1e-9  # anchors count as one anchor if their distance, relative to the robot's extent, is smaller
 _NO_LENGTH = "cables and platform: give from_anchor, the length of cable at the anchor that is not measured"
 
 
 class Pairs(NamedTuple):
-    """Pairs of numbered bodies: parts of cables, then the platform (with or without shape), then obstacles.
+    """Pairs of numbered bodies: first all parts of cables, then the platform (even without shape), then the obstacles.
 
     Attributes:
         parts: Parts of cables that occur in pairs.
@@ -128,7 +128,7 @@ Body = _CablePart | int  # part of a cable, -1 for the platform, or number of an
 def pairs_of(
     robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
 ) -> Pairs:
-    """All pairs of a robot and its obstacles. Without `from_anchor`, pairs with a common anchor are omitted."""
+    """All pairs of bodies of a robot and obstacles. Without `from_anchor`, pairs with a common anchor are omitted."""
     at_frame, at_platform = (_together(anchors) for anchors in robot_fields(robot, "frame_anchors", "platform_anchors"))
     cables = range(len(at_frame))
     found: list[tuple[Body, Body]] = []  # part of a cable, -1 for the platform, or number of an obstacle
@@ -170,7 +170,7 @@ def pairs_of(
 
 
 def _together(anchors: Array) -> NDArray[np.bool_]:
-    """Mask of pairs of cables with a common anchor in any robot of a batch, shape (m, m)."""
+    """Mask (m, m) of the pairs of cables that have a common anchor in any robot of a batch."""
     apart = np.linalg.norm(anchors[..., :, None, :] - anchors[..., None, :, :], axis=-1)
     same: NDArray[np.bool_] = (apart <= _SAME * max(1.0, float(np.abs(anchors).max()))).reshape(-1, *apart.shape[-2:])
     return np.asarray(same.any(axis=0))

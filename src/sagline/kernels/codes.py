@@ -20,7 +20,7 @@ CABLE_NOT_CONVERGED = 5
 # Tension distribution methods.
 MINIMUM_NORM = 0
 CLOSEST = 1
-QUADRATIC_PROGRAM = 2  # methods with codes up to this one find the feasible point nearest to a target
+QUADRATIC_PROGRAM = 2  # methods with the codes 0 to 2 find the feasible point nearest to a target
 LOWEST_SUM = 3
 LOWEST_MAXIMUM = 4
 P_NORM = 5
@@ -30,6 +30,12 @@ CLOSED_FORM = 8
 IMPROVED_CLOSED_FORM = 9
 PUNCTURE = 10
 POLYGON_WALK = 11
+METHOD_COUNT = 12  # number of codes of methods
+
+# The optimum of the polygon walk: least sum, least norm, centroid.
+WALK_SUM = 0.0
+WALK_NORM = 1.0
+WALK_CENTROID = 2.0
 
 # The variable of the tension distribution.
 CHORD_TENSION = 0
@@ -40,11 +46,15 @@ FRAME_END_TENSION = 2
 LIMITS_OF_CHORD = 0
 LIMITS_OF_FRAME_END = 1
 
+# Given values of an underconstrained platform; 0, 1 and 2 are the coordinates of its origin.
+YAW = 3
+LEVEL = 4
+
 # Status of the calculation of one pose.
 POSE_SOLVED = 0
 POSE_INFEASIBLE = 1  # no tensions within the limits balance the wrench
 POSE_SINGULAR = 2  # the structure matrix has lost rank
-POSE_TOO_SLACK = 3  # a cable has no catenary between its guides
+POSE_TOO_SLACK = 3  # a cable has no catenary between its ends
 POSE_NOT_CONVERGED = 4
 POSE_NO_CHORD = 5  # both ends of a cable coincide
 POSE_NOT_COVERED = 6  # feasible, but the chosen tension distribution method found no tensions within the limits
@@ -58,7 +68,7 @@ POSE_NO_EQUILIBRIUM = 11  # fewer cables than degrees of freedom: no equilibrium
 FORWARD_SOLVED = 0
 FORWARD_LOOSE = 1  # stable, with fewer taut cables than degrees of freedom
 FORWARD_OVERSTRETCHED = 2  # unrealistic strain: the cables are too short to hold the platform
-FORWARD_UNSTABLE = 3  # an equilibrium, but not a minimum of the energy
+FORWARD_UNSTABLE = 3  # an equilibrium that is not a minimum of the energy
 FORWARD_SINGULAR = 4  # an equilibrium with an unconstrained motion
 FORWARD_NOT_CONVERGED = 5
 FORWARD_NO_LENGTHS = 6  # all lengths are NaN, because the pose has no plan

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache, partial, update_wrapper
+from importlib import import_module
 from importlib.util import find_spec
 from typing import Final, TypeVar, cast
 
@@ -72,11 +73,11 @@ def _library() -> Library:
 
 
 def entry(function: F) -> F:
-    """A kernel that Python calls. It runs without Python's global lock."""
+    """A kernel that Python calls, and that runs without Python's global lock."""
     if backend() == "c":
-        found = _library().entry(function)
+        found = _library().entry(function.__name__, function.__module__)
         if found is not None:
-            return cast("F", found)
+            return cast("F", update_wrapper(found, function))
         from sagline.kernels.plain import plain
 
         say_once(f"sagline: the library has no entry {function.__name__}, which runs as plain Python")
@@ -84,8 +85,14 @@ def entry(function: F) -> F:
     return _compiled(function, "entry")
 
 
+def loaded_entry(name: str, module: str) -> object:
+    """The entry `name` of `module`. The module is not imported if the library has the entry."""
+    found = _library().entry(name, module) if backend() == "c" else None
+    return getattr(import_module(module), name) if found is None else found
+
+
 def kernel(function: F) -> F:
-    """A kernel that only kernels call. Python cannot call a kernel of this kind if numba compiles it."""
+    """A kernel that only other kernels call. Python cannot call such a kernel if numba compiles it."""
     return _compiled(function, "kernel")
 
 
@@ -100,7 +107,7 @@ def glue(function: F) -> F:
 
 
 def _compiled(function: F, kind: str) -> F:
-    """`function` for the back end. Unchanged if the back end is the compiled library, which contains the kernels."""
+    """`function` prepared for the back end. Unchanged for the compiled library, which contains the kernels."""
     if backend() == "numba":
         from sagline.kernels.with_numba import compiled
 
@@ -113,10 +120,9 @@ def _compiled(function: F, kind: str) -> F:
 
 
 def bound(function: Callable[..., object], *arguments: object, numbers: int = 0) -> Callable[..., object]:
-    """An entry that keeps its arguments for many calls. A call saves a microsecond compared with a call of the entry.
+    """An entry that keeps its arguments for many calls. Each call takes a microsecond less than a call of the entry.
 
-    The contents of the arrays may change between calls. Each call supplies new values for the last arguments, whose
-    number is `numbers`.
+    The contents of the arrays may change between calls. Each call supplies new values for the last `numbers` arguments.
     """
     if isinstance(function, Entry):
         return function.bind(arguments, numbers)

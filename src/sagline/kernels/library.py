@@ -1,4 +1,4 @@
-"""The library of compiled kernels. It contains all entries in C; loading requires no compiler.
+"""The library of compiled kernels. The library contains all entries in C; loading requires no compiler.
 
 `tools/build.py` writes two files: one for all processors and one for x86-64-v3 (processors with AVX2).
 """
@@ -25,7 +25,7 @@ FUNCTIONS: Final = (  # functions of Python's stable interface, in the order of 
     *("PyEval_SaveThread", "PyEval_RestoreThread"),
 )
 
-# letter of a format -> conversion of a number, and member of its slot
+# letter of a format -> conversion of a number, and name of the number in its slot
 CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
     "f": (float, "f"),
     "i": (operator.index, "i"),
@@ -34,7 +34,7 @@ CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
 
 
 class LibraryError(Exception):
-    """The library cannot be used. `stale` is true if it exists and was built from other sources."""
+    """The library cannot be used. `stale` is true if the library exists but was built from other sources."""
 
     def __init__(self, reason: str, *, stale: bool = False) -> None:
         """Store the reason why the library cannot be used."""
@@ -48,7 +48,7 @@ class Slot(ctypes.Union):
     _fields_ = (("f", ctypes.c_double), ("i", ctypes.c_int64), ("p", ctypes.c_void_p))
 
 
-_CALL: Final = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)  # runs without the global lock
+_CALL: Final = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)  # the call releases the global lock
 
 
 class _Row(ctypes.Structure):
@@ -66,10 +66,9 @@ class _Row(ctypes.Structure):
 class Entry:
     """A compiled kernel that Python calls, with one version per set of argument types."""
 
-    def __init__(self, function: Callable[..., object], rows: list[_Row], library: ctypes.PyDLL, python: Any) -> None:
-        """Store `rows`, the rows of the function; for `library` and `python` see `Library`."""
-        self.__wrapped__, self.__name__, self.__doc__ = function, function.__name__, function.__doc__
-        self.__module__ = function.__module__
+    def __init__(self, name: str, rows: list[_Row], library: ctypes.PyDLL, python: Any) -> None:
+        """Store `rows`, the table rows of the kernel `name`. `library`, `python`: see `Library`."""
+        self.__name__ = name
         self._rows = [(row, ctypes.addressof(row)) for row in rows]
         self._call, self._fill, self._python = library.sagline_call, library.sagline_fill, ctypes.addressof(python)
         self._kept = python
@@ -82,11 +81,11 @@ class Entry:
             if code == 0:
                 return value_of(result, row.result)
             if code == SHORT_MEMORY:
-                raise short_memory(self.__name__)
+                raise _short_memory(self.__name__)
         raise self._wrong_types()
 
     def bind(self, arguments: tuple[object, ...], numbers: int) -> Bound:
-        """Kernel with these arguments, which it keeps alive. The last `numbers` arguments may change at each call."""
+        """Kernel that keeps `arguments`. The last `numbers` arguments may change at each call."""
         for row, address in self._rows:
             slots = (Slot * row.slots)()
             if self._fill(self._python, address, arguments, slots) == 0:
@@ -104,7 +103,7 @@ class Bound:
     __slots__ = ("_call", "_kept", "_kind", "_last", "_name", "_result", "_slots")
 
     def __init__(self, name: str, row: _Row, slots: Any, numbers: int, arguments: object) -> None:
-        """Store filled slots, and keep the arguments alive."""
+        """Store the filled `slots`, and references to `arguments` so that they are not deleted."""
         self._name, self._kind, self._call = name, row.result, _CALL(row.call)
         self._result = Slot()
         self._slots, self._kept = ctypes.addressof(slots), (arguments, slots)
@@ -113,11 +112,11 @@ class Bound:
         self._last = [(slot, *CONVERSIONS[kind]) for slot, kind in zip(last, kinds, strict=True)]
 
     def __call__(self, *numbers: float) -> object:
-        """Run the kernel with new values of the last numbers."""
+        """Run the kernel with `numbers` as the values of the last arguments."""
         for (slot, convert, member), number in zip(self._last, numbers, strict=True):
             setattr(slot, member, convert(number))
         if self._call(self._slots, ctypes.addressof(self._result)):
-            raise short_memory(self._name)
+            raise _short_memory(self._name)
         return value_of(self._result, self._kind)
 
 
@@ -126,8 +125,8 @@ def value_of(slot: Slot, kind: bytes) -> object:
     return None if kind == b"N" else slot.f if kind == b"f" else bool(slot.i) if kind == b"?" else slot.i
 
 
-def short_memory(name: str) -> ValueError:
-    """Error of the entry `name` if its work arrays are too small."""
+def _short_memory(name: str) -> ValueError:
+    """Error for an entry `name` whose work arrays are too small."""
     return ValueError(f"work arrays of {name} are too small for the sizes of its other arguments")
 
 
@@ -135,11 +134,11 @@ class Library:
     """Entries of one shared library."""
 
     def __init__(self, file: Path) -> None:
-        """Load `file`. LibraryError if it is missing, cannot be loaded, or was built from other sources."""
+        """Load `file`. LibraryError if the file is missing, cannot be loaded, or was built from other sources."""
         if not file.is_file():
             raise LibraryError(f"the library of compiled kernels, {file.name}, does not exist")
         try:
-            self._library = ctypes.PyDLL(str(file))  # fills slots under the global lock
+            self._library = ctypes.PyDLL(str(file))  # this library fills the slots while it holds the global lock
             built_from = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self._library, "sagline_digest")))
         except (OSError, ValueError) as error:
             raise LibraryError(f"the library of compiled kernels, {file.name}, cannot be loaded ({error})") from error
@@ -151,6 +150,7 @@ class Library:
         self._library.sagline_fill.argtypes = (pointer, pointer, ctypes.py_object, pointer)
         self._library.sagline_call.argtypes = (pointer, pointer, ctypes.py_object, pointer)
         self._rows: dict[str, list[_Row]] = {}
+        self._entries: dict[str, Entry] = {}
         table = ctypes.addressof(_Row.in_dll(self._library, "sagline_entries"))
         while (row := _Row.from_address(table)).name:
             self._rows.setdefault(row.name.decode(), []).append(row)
@@ -166,9 +166,10 @@ class Library:
                 return cls(newer)
         return library
 
-    def entry(self, function: Callable[..., object]) -> Entry | None:
-        """The compiled version of a function. None if the library has no such version."""
-        rows = self._rows.get(function.__name__)
-        if rows is None or not function.__module__.startswith("sagline.kernels."):
+    def entry(self, name: str, module: str) -> Entry | None:
+        """The compiled version of the kernel `name` of `module`. None if the library has no such version."""
+        if name not in self._rows or not module.startswith("sagline.kernels."):
             return None
-        return Entry(function, rows, self._library, self._python)
+        if name not in self._entries:
+            self._entries[name] = Entry(name, self._rows[name], self._library, self._python)
+        return self._entries[name]

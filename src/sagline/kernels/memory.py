@@ -22,7 +22,7 @@ class Memory(NamedTuple):
 
 
 def memory_for(cables: int) -> tuple[Array, Indices]:
-    """Work arrays of a kernel for one pose of `cables` cables. A kernel that requires more memory raises ValueError."""
+    """Work arrays of a kernel for one pose with `cables` cables. A kernel that needs more memory raises ValueError."""
     return np.empty(12 * cables * cables + 320 * cables + 400), np.empty(10 * cables + 40, dtype=np.int64)
 
 
@@ -41,5 +41,5 @@ def vector(memory: Memory, size: int) -> tuple[Array, Memory]:
 
 @glue
 def counters(memory: Memory, count: int) -> tuple[Indices, Memory]:
-    """Counters (count,), and the remaining memory. `reshape` raises an error if too few counters remain."""
+    """Array of counters (count,), and the remaining memory. If too few counters remain, `reshape` raises an error."""
     return memory.counters[:count].reshape((count,)), Memory(memory.numbers, memory.counters[count:])

@@ -1,8 +1,8 @@
 """Kernels as plain Python functions with the same results as the compiled code.
 
 For a division by zero, the root of a negative number or an overflow, Python raises an exception. Compiled code gives
-inf, NaN or 0. `plain` replaces these operations in the source of a kernel. Compiled code does not detect an index
-outside an array, or the conversion of inf or NaN to an integer. In plain Python both raise an exception.
+inf, NaN or 0. `plain` replaces such operations in the source of a kernel. An index outside an array, or the conversion
+of inf or NaN to an integer, raises an exception only in plain Python.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ENTRY: Final = "entry"  # name of the decorator of kernels that Python calls
 
 
 def plain(function: F) -> F:
-    """A kernel in plain Python, with the line numbers of its file. Functions that the kernel calls must also be plain.
+    """`function` in plain Python, with the line numbers of its file. All functions called in it must also be plain.
 
     `function` is in the subset that docs/contributing/c-kernels.md defines.
     """
@@ -32,7 +32,7 @@ def plain(function: F) -> F:
     module = ast.parse(textwrap.dedent("".join(lines)))
     ast.increment_lineno(module, first - 1)
     _Compiled().visit(module)
-    # the replacements are variables of a function around the kernel, so that the module of the kernel does not change
+    # the replacements are variables of a function around the kernel, because the module of the kernel must not change
     around = ast.parse(f"def around({', '.join(REPLACEMENTS)}): return {function.__name__}")
     outer = around.body[0]
     assert isinstance(outer, ast.FunctionDef)
@@ -50,7 +50,7 @@ class _Compiled(ast.NodeTransformer):
     """Transformer that replaces the operations in which Python and compiled code differ."""
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        """Remove the decorator. An entry also accepts numbers of NumPy."""
+        """Remove the decorator. The arguments of an entry may also be numbers of NumPy."""
         is_entry = any(getattr(each, "id", "") == ENTRY for each in node.decorator_list)
         node.decorator_list = []
         self.generic_visit(node)
@@ -65,7 +65,7 @@ class _Compiled(ast.NodeTransformer):
         return ast.copy_location(ast.Name("_math", node.ctx), node) if node.id in ("math", "np") else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        """Convert array elements to numbers of Python, because numbers of NumPy warn, and NumPy integers overflow."""
+        """Convert array elements to numbers of Python. Numbers of NumPy would warn, and their integers overflow."""
         self.generic_visit(node)
         return _call("_number", node) if isinstance(node.ctx, ast.Load) else node
 
@@ -90,12 +90,12 @@ class _Compiled(ast.NodeTransformer):
 
 
 def _call(name: str, *arguments: ast.expr) -> ast.Call:
-    """A call of the replacement `name`, at the position of its first argument."""
+    """A call of the replacement `name`, with the line number of the first argument."""
     return ast.copy_location(ast.Call(ast.Name(name, ast.Load()), list(arguments), []), arguments[0])
 
 
 def _argument(value: Any) -> Any:
-    """An argument of an entry, whose numbers are converted to numbers of Python."""
+    """Convert all numbers in the argument `value` of an entry to numbers of Python."""
     return tuple(map(_argument, value)) if type(value) is tuple else _number(value)
 
 
@@ -110,7 +110,7 @@ def _numbers(values: Iterable[Any]) -> Iterable[Any]:
 
 
 def _quotient(a: Any, b: Any) -> Any:
-    """Quotient a / b; if b = 0, the result is inf with the sign of a times the sign of b, or NaN if a = 0."""
+    """Quotient a / b. For b = 0, the result is infinite, with the product of both signs, or NaN if a = 0."""
     try:
         return a / b
     except ZeroDivisionError:
@@ -148,7 +148,7 @@ def _power(base: Any, exponent: Any) -> Any:
 
 
 def _hypotenuse(x: float, y: float) -> float:
-    """Function hypot of the C library, because `math.hypot` rounds in another way."""
+    """Function hypot of the C library; the function `math.hypot` rounds differently."""
     try:
         return abs(complex(x, y))
     except OverflowError:

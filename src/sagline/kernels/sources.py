@@ -19,7 +19,7 @@ from platformdirs import user_cache_path
 KERNELS = __name__.rpartition(".")[0]
 SOURCES = Path(__file__).parent
 BACK_ENDS = frozenset(SOURCES / f"{name}.py" for name in ("jit", "library", "plain", "sources", "with_numba"))
-DIGEST = hashlib.sha256().digest_size  # bytes at the beginning of a file of machine code
+DIGEST = hashlib.sha256().digest_size  # number of bytes of the digest at the beginning of a file of machine code
 SUFFIX = ".nbc"
 # `from sagline.kernels.algebra import angle, cholesky`, also with names in parentheses
 IMPORT = re.compile(rf"^from {re.escape(KERNELS)}\.?([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
@@ -44,17 +44,17 @@ def digest(folder: Path, sources: Iterable[Path]) -> str:
 
 @cache
 def digest_of_kernels() -> str:
-    """Digest of all kernels and of the module that loads their library. The other back ends are not included."""
+    """Digest of all kernels and of the module that loads their library. Other back ends do not change this digest."""
     return digest(SOURCES, set(SOURCES.rglob("*.py")) - BACK_ENDS | {SOURCES / "library.py"})
 
 
 def is_whole(content: bytes) -> bool:
-    """True if a file of machine code begins with the digest of its other content."""
+    """True if `content`, a file of machine code, begins with the digest of its other bytes."""
     return hashlib.sha256(content[DIGEST:]).digest() == content[:DIGEST]
 
 
 def sources_of(module: str, sources: Path) -> frozenset[Path]:
-    """Source files below the folder of the kernels on which the machine code of `module` depends."""
+    """Source files of kernels on which the machine code of `module` depends."""
     if not sources.joinpath(*module.split(".")).with_suffix(".py").is_file():
         # a kernel outside the folder, such as a benchmark, may call all kernels
         return frozenset(sources.rglob("*.py"))

@@ -1,4 +1,4 @@
-"""Balance of the platform at one pose: structure matrix, needed wrench, and factors; docs/model.md, section 4.
+"""Force balance of the platform at one pose: structure matrix, needed wrench, and factors; docs/model.md, section 4.
 
 The rows `free` (n, 6) select the free motions, translations first. Each row has one nonzero entry, the unit of its
 motion. The tension distribution methods use the variable t = scale tau + offset, where tau is the chord tension. The
@@ -42,7 +42,7 @@ def is_rotation(freedom: Array, k: int) -> bool:
 
 @formula
 def squares_along(freedom: Array, part: Array) -> tuple[float, float]:
-    """Sums of squares of the components `part` (n,): along the free translations, and along the free rotations."""
+    """Two sums of squares of the components `part` (n,): over the free translations, and over the free rotations."""
     translations, rotations = 0.0, 0.0
     for k in range(freedom.shape[0]):
         if is_rotation(freedom, k):
@@ -103,7 +103,7 @@ def fill_motion_of_components(free: Array, part: Array, motion: Array) -> None:
 
 @formula
 def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
-    """Fill J (6, m). Its columns are (u; r x u), where u is the unit vector from platform end to frame end."""
+    """Fill J (6, m). Column i is (u; r x u), where u is the unit vector from platform end to frame end of cable i."""
     for i in range(geometry.shape[1]):
         x = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_X, i]
         y = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_Y, i]
@@ -121,9 +121,9 @@ def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
 def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array, needed: Array) -> None:
     """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
 
-    This wrench balances three loads. The first is the platform's weight, which no other argument includes. The second
-    is the given wrench, external plus inertial, about the center of mass. The third are the sag forces T_z - tau sin
-    phi (m,) of the cables, which act at the platform ends.
+    The needed wrench balances three loads. The first load is the platform's weight, which no other argument includes.
+    The second load is `wrench`, external plus inertial, about the center of mass. The third load are the sag forces T_z
+    - tau sin phi (m,) of the cables, which act at the platform ends.
     """
     fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
     mx = -wrench[3]
@@ -199,7 +199,7 @@ def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
     aw = w * qw - x * qx - y * qy - z * qz
     scale = 1.0 / math.sqrt(ax * ax + ay * ay + az * az + aw * aw)
     moved[3], moved[4], moved[5], moved[6] = ax * scale, ay * scale, az * scale, aw * scale
-    # displacement of the origin: displacement of the center of mass plus d = Q c - Q' c due to the rotation
+    # displacement of the origin: that of the center of mass, plus d = Q c - Q' c due to the rotation
     cx, cy, cz = body[tables.CENTER_X], body[tables.CENTER_Y], body[tables.CENTER_Z]
     before = turned(pose, cx, cy, cz)
     after = turned(moved, cx, cy, cz)
@@ -215,9 +215,6 @@ def turned(pose: Array, x: float, y: float, z: float) -> Triple:
     ty = 2.0 * (qz * x - qx * z)
     tz = 2.0 * (qx * y - qy * x)
     return (x + qw * tx + qy * tz - qz * ty, y + qw * ty + qz * tx - qx * tz, z + qw * tz + qx * ty - qy * tx)
-
-
-SHORTEST_CHORD = 1e-9  # shortest chord [m]
 
 
 class Platform(NamedTuple):
@@ -287,7 +284,7 @@ def set_pose(
 ) -> int:
     """Fill `cables` and `balance` of one pose, with first-order sag forces. Returns POSE_SOLVED or a status of failure.
 
-    weight: root weights of the cables in the distribution's variable, (m,).
+    `weight`: square roots of the weighting factors of the cables in the tension distribution, (m,).
     """
     if not place_platform(model, limits, platform, platform.pose, cables, balance):
         return codes.POSE_NO_CHORD
@@ -313,7 +310,7 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
     """Fill chords, material, first-order sag forces and admissible tensions. False if a cable has no chord."""
     for i in range(robot.shape[0]):
         chord = geometry[g.CHORD, i]
-        if not chord >= SHORTEST_CHORD:
+        if not chord >= tables.SHORTEST_CHORD:
             return False
         cables.chord[i], cables.sine[i], cables.cosine[i] = chord, geometry[g.SINE, i], geometry[g.COSINE, i]
         cables.density[i], cables.stiffness[i] = material_at(robot, i)
@@ -353,7 +350,7 @@ def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
 
 @glue
 def factor_balance(balance: Balance) -> bool:
-    """Fill pseudo-inverse and null space for the distribution's variable. False if the rank is not full."""
+    """Fill pseudo-inverse and null space for the distribution's variable. False if its rank is not full."""
     n, m = balance.matrix.shape
     matrix, reduced, q = balance.matrix, balance.reduced, balance.q
     for i in range(m):
@@ -372,12 +369,12 @@ def factor_balance(balance: Balance) -> bool:
 
 @glue
 def fill_needed_wrench(platform: Platform, cables: Cables, balance: Balance) -> None:
-    """Fill the needed wrench with the present sag forces."""
+    """Fill the needed wrench of `balance` from the present sag forces."""
     needed_wrench(balance.geometry, platform.body, platform.wrench, cables.sag_force, balance.needed)
     along_freedom(platform.freedom, balance.needed, balance.right)
 
 
 @glue
 def start_from_minimum_norm(balance: Balance) -> None:
-    """Fill row START of the bounds with the minimum-norm tensions that supply the needed wrench."""
+    """Fill row START of the limits with the minimum-norm tensions that supply the needed wrench."""
     minimum_norm(balance.inverse, balance.right, balance.bounds[START])

@@ -1,8 +1,8 @@
-"""Kernels that numba compiles, and their machine code on disk. A digest in each file shows whether it is damaged.
+"""Kernels that numba compiles, and their machine code on disk. The digest in a file shows whether the file is damaged.
 
-Each kernel has one file per set of argument types, written atomically. A damaged file is replaced after a new
-compilation. If the folder cannot be used, every process compiles the kernels again, and one line on standard error
-reports this.
+Each kernel has one file per set of argument types, written atomically. If a file is damaged, its kernel is compiled
+again and the file is replaced. If the folder cannot be used, every process compiles the kernels again, and prints one
+line about it to standard error.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _result: Any = compiler.CompileResult  # numba has no type annotations
 _dumps: Any = serialize.dumps
 
 
-class KernelCache:
+class _KernelCache:
     """Machine code of one kernel on disk. numba's own cache is not used, because it does not check files."""
 
     def __init__(self, function: Callable[..., object], folder: Path, *, announced: bool = False) -> None:
@@ -74,7 +74,7 @@ class KernelCache:
         return _result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
 
     def save_overload(self, signature: object, compiled: Any) -> None:
-        """Write the machine code for the argument types `signature`. If this is not possible, the cause is reported."""
+        """Write the machine code for the argument types `signature`. If writing fails, a line reports the cause."""
         if not self._enabled or compiled.lifted or compiled.library.has_dynamic_globals:
             return
         payload = _dumps(compiled._reduce())
@@ -95,12 +95,12 @@ class KernelCache:
             )
 
     def _file(self, signature: object, codegen: Any) -> Path:
-        """File for argument types, a processor and a version of numba."""
+        """File for the argument types `signature`, the processor, and the version of numba."""
         key = repr((numba.__version__, str(signature), codegen.magic_tuple(), self._code.co_code))
         return self._folder / f"{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}{SUFFIX}"
 
 
-INNER: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # this takes a third of the time of a compilation
+INNER: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # this step takes a third of the compilation time
 OPTIONS: Final[dict[str, dict[str, Any]]] = {
     "entry": {"nogil": True},
     "kernel": INNER,
@@ -112,25 +112,25 @@ OPTIONS: Final[dict[str, dict[str, Any]]] = {
 def compiled(function: F, kind: str) -> F:
     """A kernel whose machine code is kept on disk. A division by zero gives inf or NaN, as in NumPy.
 
-    Kernels allocate no memory (`sagline.kernels.memory`). Reference counting (_nrt) is therefore off; for arrays in
-    NamedTuples it would take a quarter of the time.
+    Kernels allocate no memory (`sagline.kernels.memory`). Reference counting (_nrt) is therefore off. With arrays in
+    NamedTuples, reference counting would take a quarter of the run time.
     """
     every: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **OPTIONS[kind]}
     return kept(cast("F", numba.njit(**every)(function)), folder_of(function.__module__), announced=kind == "entry")
 
 
 def kept(dispatcher: F, folder: Path, *, announced: bool = False) -> F:
-    """A compiled function whose machine code is kept in a folder. If requested, one line announces the compilation."""
+    """A compiled function whose machine code is kept in a folder. One line can announce the compilation."""
     numbas: Any = dispatcher
-    numbas._cache = KernelCache(numbas.py_func, folder, announced=announced)
+    numbas._cache = _KernelCache(numbas.py_func, folder, announced=announced)
     return dispatcher
 
 
 def machine_code(function: Callable[..., object], arguments: tuple[object, ...]) -> Callable[..., object]:
-    """An entry's machine code for arguments of these types, compiled or read from disk.
+    """Machine code of an entry for the types of `arguments`, compiled or read from disk.
 
-    A call does not check the types of the arguments, which saves a microsecond for a dozen arrays. All arguments must
-    have exactly these types.
+    A call does not check the types of the arguments, which saves a microsecond for a dozen arrays. All arguments of a
+    call must have exactly the types of `arguments`.
     """
     dispatcher: Any = function
     signature = tuple(cast("Any", numba.typeof)(argument) for argument in arguments)

@@ -1,4 +1,4 @@
-"""Confirmation of a plan: the actual equilibrium of the platform at the planned lengths."""
+"""Confirmation of a plan: exact equilibria of the platform at the planned lengths."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Confirmation(Result, Tabular):
         plan: The plan, of any cable model.
         pose: Equilibrium pose with catenary cables of the planned lengths; NaN if the plan has no solution.
         status: Codes of `ForwardStatus`, shape () or (N,).
-        wrench_residual: Norms of the unbalanced force [N] and moment [N m] at the equilibrium pose, shape (2,) or (N,
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] at the equilibrium pose: shape (2,) or (N,
             2).
     """
 
@@ -65,7 +65,7 @@ class Confirmation(Result, Tabular):
     def rotation_error(self) -> Array:
         """Angle between equilibrium orientation and planned orientation [rad], shape () or (N,)."""
         planned, real = self.plan.state.pose.quaternion, self.pose.quaternion
-        # Sine and cosine of half the angle give a precise angle, even if the angle is very small.
+        # With sine and cosine of half the angle, even a very small angle is precise.
         sine = 0.5 * np.linalg.norm(real - planned, axis=-1) * np.linalg.norm(real + planned, axis=-1)
         cosine = np.abs(np.einsum("...i,...i->...", real, planned))
         return locked(np.asarray(2.0 * np.arctan2(sine, cosine)))
@@ -79,7 +79,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     Args:
         plan: A plan of any cable model. The cable model of the plan causes the pose errors. With the exact model, the
             pose errors are only rounding errors.
-        progress: Function that is called about ten times per second. Its arguments are the number of confirmed poses
+        progress: Function that is called about ten times per second. The arguments are the number of confirmed poses
             and the number of all poses.
 
     Returns:
@@ -99,7 +99,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     """
     callback(progress, "progress")
     state, lengths = instance(plan, Plan, "plan").state, plan.unstrained_length
-    if not state.pose.shape or not len(lengths):  # a single block
+    if not state.pose.shape or not len(lengths):  # all poses in a single block
         found = _forward(state, progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     parts = []
@@ -124,5 +124,5 @@ def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
 
 
 def _from(first: int, count: int, progress: Progress) -> Progress:
-    """Progress callback for a part of the poses. It also counts the `first` poses before this part."""
+    """Progress callback for a part of `count` poses. The `first` poses before this part are added to the number."""
     return lambda done, _: progress(first + done, count)

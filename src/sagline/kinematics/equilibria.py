@@ -16,7 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
-from sagline.kernels.forward.platform import ENERGY
+from sagline.kernels import tables
 from sagline.kinematics.forward import checked_lengths, from_orientations, start_quaternions
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution, iterate_routing
 from sagline.kinematics.status import STABLE, ForwardStatus
@@ -26,7 +26,7 @@ from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 
 START_BYTES = 250.0  # memory per cable and per start of the search [bytes]
-_SAME = 1e-6  # poses with a smaller distance, relative to the mean length and in radians, count as equal
+_SAME = 1e-6  # two poses count as equal if their distance (relative to the mean length) and angle [rad] are smaller
 _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
 
@@ -37,8 +37,8 @@ class Equilibria(Result, Tabular):
 
     Attributes:
         solutions: The equilibria, a batch of K.
-        reached: Number of starts of the search that ended in each equilibrium, shape (K,). This number is not a
-            probability.
+        reached: For each equilibrium, number of starts of the search that ended in it, shape (K,). The number of starts
+            is not a probability.
         starts: Number of all starts of the search. A start may also end at an unstable equilibrium, or may not
             converge.
     """
@@ -69,16 +69,16 @@ def equilibria(
 ) -> Equilibria:
     """Stable equilibria of a robot at given lengths, found by a search over orientations.
 
-    For a fixed orientation the energy is convex in the position, so only orientations are searched. The orientations of
-    the starts are uniformly random. The search of an orientation starts at its only equilibrium position. A robot
-    without rotations has exactly one equilibrium. For other robots the list can be incomplete, because no start may
-    reach an equilibrium.
+    For a fixed orientation, the energy is convex in the position, so that the platform has only one equilibrium
+    position. The search therefore starts at random orientations (uniformly distributed), each at its equilibrium
+    position. A robot without rotations has exactly one equilibrium. For other robots, the list can be incomplete,
+    because perhaps no start reaches some equilibrium.
 
     Args:
         robot: The robot, with m cables.
         unstrained_length: L [m], > 0, shape (m,).
-        model: Cable model. The shallow models have no energy. Their equilibria are sorted by the number of starts. For
-            straight cables, the results are local least-squares fits, sorted by their sum of squares.
+        model: Cable model. The shallow models have no energy. Equilibria of a shallow model are sorted by the number of
+            starts. For straight cables, the results are local least-squares fits, sorted by their sum of squares.
         wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
         starts: Number of initial orientations, >= 1.
         seed: Seed of the random orientations.
@@ -87,7 +87,7 @@ def equilibria(
         Equilibria.
 
     Raises:
-        InvalidValueError: If a length is wrong; the message names the cable. If `starts` is below 1 or needs too much
+        InvalidValueError: If a length is wrong: the message names the cable. If `starts` is below 1 or needs too much
             memory. If an argument has the wrong type.
 
     Examples:
@@ -121,7 +121,7 @@ def equilibria(
 
 
 def _quaternions(robot: Robot, count: int, seed: int) -> Array:
-    """Start orientations (K, 4): first level and tilted, then uniformly random within the free rotations."""
+    """Start orientations (K, 4): level, then tilted, then uniformly random within the free rotations."""
     known = start_quaternions(robot)
     if robot.motion_pattern not in ROTATING or count <= len(known):
         return known[:count]
@@ -137,20 +137,20 @@ def _quaternions(robot: Robot, count: int, seed: int) -> Array:
 
 
 def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
-    """Index of each different stable equilibrium, in order of energy, and number of starts that ended there."""
-    counts: dict[int, int] = {}  # by index of a different equilibrium
+    """Index of each different stable equilibrium, in order of energy, and number of starts that ended in it."""
+    counts: dict[int, int] = {}  # key: index of an equilibrium that differs from all others
     for index in np.flatnonzero(np.isin(found.pose_status, _KEPT)).tolist():
         same = (k for k in counts if _distance(found.poses[index], found.poses[k], length) < _SAME)
         chosen = next(same, index)
         counts[chosen] = counts.get(chosen, 0) + 1
     different, reached = (np.array([*each], dtype=np.int64) for each in (counts, counts.values()))
-    energy = np.nan_to_num(found.numbers[different, ENERGY], nan=0.0)
+    energy = np.nan_to_num(found.numbers[different, tables.ENERGY], nan=0.0)
     order = np.lexsort((-reached, energy))
     return different[order], reached[order]
 
 
 def _distance(row: Array, other: Array, length: float) -> float:
-    """Distance of two pose rows: the larger of relative displacement and angle."""
+    """Distance of two pose rows: their relative displacement or their angle, whichever is larger."""
     shift = float(np.linalg.norm(row[:3] - other[:3])) / length
     sign = np.copysign(1.0, row[3:] @ other[3:])
     return max(shift, 2.0 * float(np.linalg.norm(row[3:] - sign * other[3:])))

@@ -19,7 +19,6 @@ from sagline.core.memory import check_poses
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.core.results import Result
 from sagline.kernels import codes, tables
-from sagline.kernels.forward.platform import ENERGY
 from sagline.kinematics import forward_rows
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution, solve_forward_rows
 from sagline.robot import batch
@@ -30,24 +29,24 @@ from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
-from sagline.statics.stiffness import stiffness
 from sagline.statics.tables import pose_rows
 
-_TILTS = (25.0, 60.0)  # tilts of further starts if the level start fails [degree]
+_TILTS = (25.0, 60.0)  # tilts of the other start orientations, after the level one has failed [degree]
 DEPTH = 0.1  # distance of the first position below the center, relative to the mean length
-_LIMIT_SLACK = 0.01  # largest relative excess of a tension that counts as within its limits
-# status -> rank, a smaller rank is better; FITTED has the same rank as SOLVED
+_LIMIT_SLACK = 0.01  # a tension counts as within its limits up to this relative excess
+# status -> rank: a smaller rank is better, and FITTED has the same rank as SOLVED
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])
 
 
 def search(
     robot: batch.Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
 ) -> ForwardRows:
-    """Forward kinematics of lengths (N, m) without initial poses; every sample is searched independently."""
+    """Forward kinematics of lengths (N, m) without initial poses. Each sample is searched independently."""
     # With a fixed orientation the platform has a single equilibrium, because the energy is convex in the position. Any
-    # start leads to this equilibrium. The search over all motions then starts there. The first start orientation is
-    # level. If no stable equilibrium within the tension limits is found, the search is repeated from tilted starts. The
-    # results are compared first by status, then by the number of cables outside their limits, then by energy.
+    # start leads to this equilibrium. From there, the search continues with all motions free. The first start
+    # orientation is level. If no stable equilibrium within the tension limits is found, the search is repeated from
+    # tilted starts. The results are compared first by status, then by the number of cables outside their limits, then
+    # by energy.
     count, m = lengths.shape
     found = ForwardRows.empty(robot, count)
     for part in blocks(count, max(1, forward_rows.BLOCK // m), progress):
@@ -64,9 +63,9 @@ def _search_block(robot: batch.Robots, model: CableModel, lengths: Array, wrench
         robots = batch.robots_at(robot, left)
         answer = from_orientations(robots, model, locked(lengths[left]), loads, quaternion)
         outside = outside_limits(robots, model, answer)
-        energy = np.nan_to_num(answer.numbers[:, ENERGY], nan=0.0)
+        energy = np.nan_to_num(answer.numbers[:, tables.ENERGY], nan=0.0)
         rank = np.stack((_POOR[answer.pose_status].astype(np.float64), outside, energy), axis=1)
-        first = np.argmax(rank != ranks[left], axis=1)[:, None]  # column of the first difference
+        first = np.argmax(rank != ranks[left], axis=1)[:, None]  # column of the first difference of two rankings
         better = np.flatnonzero(np.take_along_axis(rank, first, 1) < np.take_along_axis(ranks[left], first, 1))
         found.keep(left[better], answer, better)
         ranks[left[better]] = rank[better]
@@ -80,7 +79,7 @@ def _search_block(robot: batch.Robots, model: CableModel, lengths: Array, wrench
 def from_orientations(
     robot: batch.Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array
 ) -> ForwardRows:
-    """Solve from the middle of the frame, first the position, then all motions; `quaternion`: (4,) or (N, 4)."""
+    """Equilibria from the middle of the frame: first with fixed `quaternion` (4,) or (N, 4), then with all motions."""
     shared = batch.first_of(robot)
     freedom = shared.freedom
     starts = pose_rows(Pose.from_quaternion(starting_positions(robot, lengths, quaternion), quaternion))
@@ -92,8 +91,8 @@ def from_orientations(
 
 
 def starting_positions(robot: batch.Robots, lengths: Array, quaternion: Array) -> Array:
-    """Positions (N, 3) slightly below the center of the frame ends, within the platform's free motions [m]."""
-    # At the center itself, the two ends of a single cable would coincide.
+    """Start positions (N, 3) [m] slightly below the center of the frame ends, within the platform's free motions."""
+    # The center itself is excluded, because there the two ends of a single cable would coincide.
     freedom = batch.first_of(robot).freedom
     depth = DEPTH * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
     position: Array = centered_positions(robot, quaternion) - depth * (freedom[:, 2] @ freedom[:, :3])
@@ -121,7 +120,7 @@ def start_quaternions(robot: Robot) -> Array:
 
 
 def outside_limits(robot: batch.Robots, model: CableModel, found: ForwardRows) -> Indices:
-    """Number of cables outside the tension limits, (N,); 0 for straight cables, whose tensions are unknown."""
+    """Number of cables outside their tension limits, (N,), or 0 for straight cables, whose tensions are unknown."""
     least, most = batch.robot_fields(robot, "tension_min", "tension_max")
     cables, contact = cables_of_results(robot, model, found.results, found.cable_status, found.pose_status.shape)
     tension = limited_tension(robot, cables, contact)
@@ -133,14 +132,14 @@ def outside_limits(robot: batch.Robots, model: CableModel, found: ForwardRows) -
 
 _STEPS = 100
 _HALVINGS = 20
-# The fit ends if the predicted decrease of the sum of squares, relative to the sum, is smaller than this number. The
+# The fit ends if a step would decrease the sum of squares by less than this share of it. The
 # optimum is then closer than 1e-4 standard deviations.
 _TOLERANCE = 1e-8
 
 
 @frozen(eq=False, weakref_slot=False)
 class MeasuredTension(Result):
-    """Load cells at the frame ends of the cables, with standard deviations of tensions and lengths.
+    """Load cell data: tensions at the frame ends of the cables, and standard deviations of tensions and lengths.
 
     Attributes:
         frame_end_tension: Measured tensions [N], shape (m,) or (N, m); NaN for a cable without a load cell.
@@ -148,7 +147,7 @@ class MeasuredTension(Result):
         length_deviation: Standard deviation of an unstrained length [m], > 0, a number or shape (m,).
 
     Raises:
-        InvalidValueError: If a measured tension is negative or infinite, or a deviation is not positive.
+        InvalidValueError: If a measured tension is negative or infinite. If a deviation is not positive.
     """
 
     frame_end_tension: Array = field(converter=given, metadata=rule("N", low=0.0, missing=True))
@@ -163,14 +162,14 @@ class MeasuredTension(Result):
     __reduce__ = reduced
 
 
-def fit_measurements(
+def _fit_measurements(
     robot: batch.Robots, model: CableModel, found: ForwardRows, loads: Array, measured: MeasuredTension
 ) -> Array:
     """Replace equilibria at measured lengths by best fits to lengths and tensions. Returns covariances (N, 6, 6)."""
     # For each sample, Gauss-Newton iterations find the lengths L_true with the smallest sum ((L_true - L)/sigma_L)^2 +
     # sum ((T_A - reading)/sigma_T)^2. The platform is in equilibrium at L_true. The search starts at the equilibria at
-    # the measured lengths. The covariances are those of displacement of the center of mass and rotation vector, NaN
-    # without a solution.
+    # the measured lengths. The covariances refer to displacement of the center of mass and rotation vector; NaN without
+    # a solution.
     if model.code == codes.STRAIGHT:
         step = "Use Catenary() with measured tensions."
         raise InvalidValueError("model", "Straight()", "a cable model other than Straight", step)
@@ -184,7 +183,8 @@ def fit_measurements(
     for i in np.flatnonzero(found.stable):
         sample = np.array([i])
         load = locked(loads[i % len(loads)].copy())
-        given = batch.robot_at(robot, int(i)), model, lengths[i].copy(), load, readings[i], *deviations
+        own = robot if isinstance(robot, Robot) else robot[i]
+        given = own, model, lengths[i].copy(), load, readings[i], *deviations
         answer, covariance[i] = _best_fit(found.part(sample), *given)
         found.keep(sample, answer)
     return locked(covariance)
@@ -208,7 +208,7 @@ def _best_fit(
     tension_deviation: Array,
     length_deviation: Array,
 ) -> tuple[ForwardRows, Array]:
-    """Best fit to one sample and covariance of its pose; the search starts at the equilibrium at measured lengths."""
+    """Best fit to one sample, and covariance of its pose. The search starts at the equilibrium at measured lengths."""
     known = ~np.isnan(readings)
 
     def misfit(state: Equilibrium) -> Array:
@@ -217,7 +217,7 @@ def _best_fit(
         return np.concatenate(((state.unstrained_length - measured) / length_deviation, tensions[known]))
 
     def moved(step: Array, now: Array) -> tuple[ForwardRows, Equilibrium] | None:
-        """Equilibrium after `step`, which is halved until the fit improves; None if the fit does not improve."""
+        """Equilibrium after `step`. The step is halved until the fit improves; None if the fit never improves."""
         lengths, starts = found.results[tables.LENGTH], locked(found.poses.view())
         for _ in range(_HALVINGS):
             if (lengths + step > 0.0).all():
@@ -228,6 +228,8 @@ def _best_fit(
                     return new, there
             step = 0.5 * step
         return None
+
+    from sagline.statics.stiffness import stiffness  # not needed for the confirmation of a plan
 
     state, covariance = found.solution(robot, model, load, ()).state, np.full((6, 6), np.nan)
     for _ in range(_STEPS):
@@ -268,24 +270,24 @@ def forward(
     Args:
         robot: The robot, with m cables; or a sequence of N robots, one per sample. The robots must have the same number
             of cables, motion pattern, plane normal, type of tension limits and gravity; all other data may differ.
-        unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN gets the status NO_LENGTHS; a
-            plan has such a row at an infeasible pose.
+        unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN gets the status NO_LENGTHS. A
+            plan has such a row at each infeasible pose.
         start: Initial pose. With a batch of N poses, each sample has its own start. With a single pose and N samples,
             the samples are a trajectory: the first sample starts at this pose, and each following sample at the
             previous result. With None, every sample is searched independently from the level platform. If several
-            equilibria exist, the result is the first one within the tension limits of the robot (`equilibria` finds
-            others).
+            equilibria exist, the result is the first that is within the tension limits of the robot. To find the
+            others, use `equilibria`.
         model: Cable model; the default is exact.
         wrench: External plus inertial wrench on the platform about its center of mass in world axes, without gravity:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        tension_measured: Load cell data, or None. With load cell data, lengths and tensions are measured values with
-            standard deviations. The result is then the least-squares fit to lengths and tensions, and contains the
-            covariance of the pose.
+        tension_measured: Load cell data, or None. Lengths and tensions then count as measured values with standard
+            deviations. The result is then the least-squares fit to lengths and tensions, and contains the covariance of
+            the pose.
         winding: Last direction of each drum, which determines the friction of pulleys and guides: +1 winding in, -1
             paying out, 0 at rest, shape (m,) or (N, m). None: no friction. Friction and guides change the lengths; an
             iteration computes this change. With load cell data, the change is computed only once, at the measured
             lengths. With high friction and soft cables, several nearby poses can be equilibria.
-        progress: Function that is called about ten times per second. Its arguments are the number of solved samples and
+        progress: Function that is called about ten times per second. The arguments are the number of solved samples and
             the number of all samples.
 
     Returns:
@@ -293,8 +295,8 @@ def forward(
 
     Raises:
         InvalidValueError: If an argument has the wrong type or shape. If a length is not positive, not longer than the
-            dead length, or NaN beside other lengths; the message names the cable. If several robots do not fit
-            together; the message names the property. If `start` is outside the motions of the robot's pattern. If the
+            dead length, or NaN beside other lengths: the message names the cable. If several robots do not fit
+            together: the message names the property. If `start` is outside the motions of the robot's pattern. If the
             samples need more memory than is free.
 
     Source:
@@ -326,19 +328,19 @@ def forward(
     else:
         check_reach(batch.first_of(robots), start, "start")
         chained = bool(shape) and not start.shape
-        starts = start_rows(start, lengths)
+        starts = _start_rows(start, lengths)
         found = solve_forward_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
     if differs(robots, direction):
         found = forward_rows.iterate_routing(robots, model, found, samples, loads, direction)
     covariance = None
     if tension_measured is not None:
-        covariance = fit_measurements(robots, model, found, loads, tension_measured)
+        covariance = _fit_measurements(robots, model, found, loads, tension_measured)
     solution = found.solution(robots, model, load, shape, covariance)
     return replace(solution, state=with_routing(solution.state, direction))
 
 
 def checked_lengths(robot: batch.Robots, lengths: ArrayLike) -> Array:
-    """Lengths (m,) or (N, m) of a caller: positive and longer than the dead lengths, or NaN for whole rows."""
+    """Check lengths (m,) or (N, m) of a caller: positive and longer than the dead lengths, or NaN in whole rows."""
     array = numbers(lengths, "unstrained_length", "m")
     shared, dead = batch.first_of(robot), batch.dead_cable(robot)
     m = shared.cable_count
@@ -351,14 +353,14 @@ def checked_lengths(robot: batch.Robots, lengths: ArrayLike) -> Array:
         index, item = _first(wrong)
         allowed = "> 0 m, finite; or NaN for all cables of a sample"
         raise InvalidValueError(item, f"{array[index]:g} m", allowed, "Correct the length of this cable.")
-    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # a wrong number of lengths is refused later
+    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # a later check refuses a wrong number of lengths
     if fitting and ((array <= dead) & (dead > 0.0)).any():
         raise dead_only(array, np.broadcast_to(dead, array.shape))
     return locked(array)
 
 
 def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
-    """Error for a length (m,) or (N, m) that does not exceed its dead length; it names the cable and the sample."""
+    """Error for lengths (m,) or (N, m) that do not exceed the dead length; the message names the first one."""
     index, item = _first((lengths <= dead) & (dead > 0.0))
     allowed = f"> {dead[index]:.9g} m, the dead length between drum and pulley"
     step = "Give the length of all cable off the drum, or correct dead_cable."
@@ -366,13 +368,13 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
 
 
 def _first(wrong: Flags) -> tuple[tuple[int, ...], str]:
-    """Index of the first wrong length (m,) or (N, m), and its name."""
+    """Index of the first True in `wrong` (m,) or (N, m), and the name of this length for messages."""
     index = tuple(int(i) for i in np.argwhere(wrong)[0])
     sample = f"sample {index[0]}, " if wrong.ndim == 2 else ""
     return index, f"{sample}cable {index[-1]}: unstrained length"
 
 
-def start_rows(start: Pose, lengths: Array) -> Array:
+def _start_rows(start: Pose, lengths: Array) -> Array:
     """Pose rows (1 or N, POSE_COLUMNS) of the starts for lengths of shape (m,) or (N, m)."""
     if start.shape and start.shape != lengths.shape[:-1]:
         allowed = f"one pose, or {len(lengths)}" if lengths.ndim == 2 else "one pose, for one sample"

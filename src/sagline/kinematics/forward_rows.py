@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,18 +15,19 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
-from sagline.kernels import codes, tables
+from sagline.kernels import codes, fit_poses, forward_poses, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.forward import platform
-from sagline.kernels.forward.forward import fit_poses, forward_poses
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.robot.batch import Robots, first_of, has_routing, robots_at
-from sagline.robot.equilibrium import Equilibrium, cables_of_results
+from sagline.robot.equilibrium import Equilibrium, cables_of_results, result_rows
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
-from sagline.statics.tables import body_table, cable_table
+from sagline.statics.tables import body_table, cable_table, check_slanted
+
+if TYPE_CHECKING:
+    from sagline.kernels.forward.platform import LastEquilibriumArrays, SolutionArrays
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -40,10 +41,10 @@ class ForwardSolution(Result, Tabular):
             is measured by its arc length at the root mean square distance of the platform ends from the center of mass.
         energy: Potential energy of cables, weight and given force [J], shape () or (N,). Heights of cables are measured
             from their frame ends; all other heights are measured from the world origin. NaN for the shallow models,
-            which have no energy. For straight cables, the objective of the fit: half the sum of squared length errors
-            [m^2].
-        wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
-            shape (2,) or (N, 2).
+            which have no energy. For straight cables, half the sum of squared length errors [m^2], which the fit
+            minimizes.
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] along the platform's free motions, shape
+            (2,) or (N, 2).
         iterations: Number of Newton steps, shape () or (N,).
         covariance: Covariance of a pose from measured tensions: displacement of the center of mass [m] and rotation
             vector [rad], world axes, shape (6, 6) or (N, 6, 6). None if no tensions were measured.
@@ -83,9 +84,9 @@ class ForwardSolution(Result, Tabular):
 
     @property
     def slack(self) -> Flags:
-        """True for slack cables, shape (m,) or (N, m): tau is at most half the weight of a cable as long as the chord.
+        """True for slack cables, shape (m,) or (N, m): tau is at most half the weight of a cable of the chord's length.
 
-        Such a cable sags by a quarter of its chord or more. A weightless cable is slack if its tension is zero.
+        A slack cable sags by a quarter of its chord or more. A weightless cable is slack if its tension is zero.
         """
         cables = self.state.cables
         density = np.zeros(()) if cables.model.weightless else cables.cable.linear_density
@@ -97,7 +98,7 @@ BLOCK = 1 << 13  # cables per block; a block takes at most 130 ms, and interrupt
 
 
 class ForwardRows(NamedTuple):
-    """Results of the kernel, in the order of the kernel's arguments."""
+    """Results of the kernel for N samples, in the order of the kernel's arguments."""
 
     poses: Array
     results: Array
@@ -106,7 +107,7 @@ class ForwardRows(NamedTuple):
     pose_status: Codes
 
     def keep(self, samples: Indices | slice, other: ForwardRows, which: Indices | slice = slice(None)) -> None:
-        """Replace the results of the samples `which` (k,) of the batch by the results of `other` (k,)."""
+        """Replace the results of the samples with the indices `which` (k,) by the results in `other`, (k,)."""
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
         self.cable_status[samples] = other.cable_status[which]
@@ -124,13 +125,13 @@ class ForwardRows(NamedTuple):
         )
 
     def last_pose(self, before: Array) -> Array:
-        """Last pose row with a result, (1, POSE_COLUMNS). If no sample has a result: `before`."""
+        """Last pose row with a result, (1, POSE_COLUMNS), or `before` if no sample has a result."""
         which = np.flatnonzero(~np.isin(self.pose_status, _OPEN))[-1:]
         return locked(self.poses[which]) if which.size else before
 
     @property
-    def arrays(self) -> platform.SolutionArrays:
-        """Plain tuple of the arrays, which kernels accept fastest."""
+    def arrays(self) -> SolutionArrays:
+        """The arrays as a plain tuple, because kernels accept plain tuples fastest."""
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
     @classmethod
@@ -139,9 +140,9 @@ class ForwardRows(NamedTuple):
         cables = first_of(robot).cable_count
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
-            np.empty((tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS, count, cables)),
+            np.empty((result_rows(robot), count, cables)),
             np.empty((count, cables), dtype=np.int8),
-            np.empty((count, platform.FORWARD_NUMBERS)),
+            np.empty((count, tables.FORWARD_NUMBERS)),
             np.empty(count, dtype=np.int8),
         )
 
@@ -158,18 +159,18 @@ class ForwardRows(NamedTuple):
         shape: tuple[int, ...],
         covariance: Array | None = None,
     ) -> ForwardSolution:
-        """Result of `forward` of the shape `shape`, () or (N,); `load` (6,) or (N, 6); `covariance` (N, 6, 6)."""
+        """Result of `forward` with the shape `shape`: () or (N,). `load`: (6,) or (N, 6). `covariance`: (N, 6, 6)."""
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
-        residuals = self.numbers[:, [platform.FORCE_RESIDUAL, platform.MOMENT_RESIDUAL]]
+        residuals = self.numbers[:, [tables.FORCE_RESIDUAL, tables.MOMENT_RESIDUAL]]
         cables, contact = cables_of_results(robot, model, self.results, self.cable_status, shape)
         return ForwardSolution(
             state=Equilibrium(robot, pose, whole, cables, contact),
             status=locked(self.pose_status.reshape(shape)),
-            stiffness_min=locked(self.numbers[:, platform.STIFFNESS_MIN].reshape(shape)),
-            energy=locked(self.numbers[:, platform.ENERGY].reshape(shape)),
+            stiffness_min=locked(self.numbers[:, tables.STIFFNESS_MIN].reshape(shape)),
+            energy=locked(self.numbers[:, tables.ENERGY].reshape(shape)),
             wrench_residual=locked(residuals.reshape(*shape, 2)),
-            iterations=locked(self.numbers[:, platform.ITERATIONS].astype(np.int64).reshape(shape)),
+            iterations=locked(self.numbers[:, tables.ITERATIONS].astype(np.int64).reshape(shape)),
             covariance=None if covariance is None else locked(covariance.reshape(*shape, 6, 6)),
         )
 
@@ -185,13 +186,14 @@ def solve_forward_rows(
     freedom: Array | None = None,
     progress: Progress | None = None,
 ) -> ForwardRows:
-    """Run the kernel over samples (N, m) in blocks, from pose rows `starts` and with `wrenches` (1 or N, 6) each."""
+    """Run the kernel over samples (N, m) in blocks, with pose rows `starts` and `wrenches`, 1 or N rows each."""
     # chained: True if each sample starts at the result of the previous sample; freedom: free motions (n, 6), by default
     # those of the robot; progress: called after each block with the number of finished samples and of all samples
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
-    bodies, cables, behind = body_table(robot), cable_table(robot), has_routing(robot) or None
-    chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain continues from block to block
+    check_slanted(robot, model)
+    bodies, cables, behind = body_table(robot), cable_table(robot, slanted=True), has_routing(robot) or None
+    chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain continues in the next block
     found = ForwardRows.empty(robot, count)
     for part in blocks(count, max(1, BLOCK // m), progress):
         block = ForwardRows.empty(robot, part.stop - part.start)
@@ -207,17 +209,17 @@ def solve_forward_rows(
     return found
 
 
-def new_chain(cables: int, freedoms: int) -> platform.LastEquilibriumArrays:
-    """Arrays that pass the last equilibrium of a chain to the next sample. At the start of the chain, all are NaN."""
+def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
+    """Arrays that pass the last equilibrium of a chain to the next sample, and are NaN at the start of the chain."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),
-        np.full(platform.LAST_COLUMNS, np.nan),
+        np.full(tables.LAST_COLUMNS, np.nan),
     )
 
 
 Winding = ArrayLike | Literal["path"]
-# usually about ten are needed, but more for large changes of the routing length or for high friction
+# largest number of iterations; usually about ten suffice, but not with high friction
 ITERATIONS: Final = 100
 MEMORY: Final = 5  # number of previous iterations that Anderson mixing uses
 _RANK: Final = 1e-6
@@ -241,7 +243,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 
 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
-    """Return `robot`, but refuse a robot with guides; `solver` is the function that does not support them."""
+    """Return `robot`, or refuse it if it has guides, which the function `solver` does not support."""
     if robot.winches is None or robot.winches.guides is None:
         return robot
     step = f"Use {instead}(), or robot.replace(winches=robot.winches.replace(guides=None)) for a straight guided run."
@@ -257,13 +259,13 @@ def iterate_routing(
     winding: Array | None,
     taken: Array | None = None,
 ) -> ForwardRows:
-    """Equilibria at lengths (N, m) that include the actual routing; `found`: those for straight guided cables."""
-    # The lengths for the kernels are the given lengths minus the correction for guides and friction. Each iteration
-    # computes the correction at the last tensions. `found` is without friction, at the given lengths minus the initial
-    # correction `taken` [m], (N, m), None for zero. The status is NOT_CONVERGED if the iteration does not converge, or
-    # a cable is too slack for a catenary between its guides.
+    """Equilibria at lengths (N, m) that include the actual routing. `found`: equilibria with straight guided cables."""
+    # The lengths for the kernels are the given lengths minus a correction for guides and friction. Each iteration
+    # computes this correction from the last tensions. `found` is without friction, at the given lengths minus the
+    # initial correction `taken` [m], (N, m), None for zero. The status is NOT_CONVERGED if the iteration does not
+    # converge, or a cable is too slack for a catenary between its guides.
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
-    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # input and residual of the last iterations
+    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # inputs and residuals of the last iterations
     still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
     for _ in range(ITERATIONS):
         if not still.size:
@@ -293,7 +295,7 @@ def iterate_routing(
 
 
 def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Array:
-    """The next iterate by Anderson mixing, from previous inputs and residuals, (N, m)."""
+    """Next input of the iteration, (N, m), by Anderson mixing of previous inputs and residuals."""
     if not past:
         return missed
     changes = np.stack([missed - before for _, before in past], axis=-1)
@@ -304,7 +306,7 @@ def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]])
 
 
 def _routing_change(robot: Robots, model: CableModel, found: ForwardRows, winding: Array | None) -> Array:
-    """Change of the lengths due to guides and friction [m], (N, m); NaN for a cable that is too slack."""
+    """Change of the lengths due to guides and friction [m], (N, m). NaN if a cable is too slack for its guides."""
     shape = (len(found.poses),)
     plain = found.solution(robot, model, np.zeros(6), shape).state
     real = with_routing(plain, winding)

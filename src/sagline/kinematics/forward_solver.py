@@ -14,7 +14,6 @@ from sagline.core.arrays import LARGEST, SMALLEST, Array, checked, exactly, lock
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
-from sagline.kernels.forward.platform import FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward import dead_only, search
 from sagline.kinematics.forward_rows import ForwardRows, new_chain, without_guides
@@ -33,7 +32,7 @@ class ForwardStep(NamedTuple):
         position: Position of the platform origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
         chord_tension: tau of the cables [N], shape (m,).
-        status: Kind of the equilibrium, or reason why no equilibrium was found.
+        status: Kind of the equilibrium, or the reason if no equilibrium was found.
         stiffness_min: Smallest stiffness [N/m], as in `ForwardSolution`.
         force_residual: Norm of the unbalanced force [N].
         moment_residual: Norm of the unbalanced moment [N m].
@@ -51,8 +50,8 @@ class ForwardStep(NamedTuple):
 class ForwardSolver:
     """Solver for successive samples. Each sample starts from the last stable equilibrium.
 
-    The solver owns its work arrays. It stores the last equilibrium, which `reset` clears. Use one solver per control
-    loop, and do not share a solver between threads.
+    The solver owns its work arrays, and stores the last equilibrium. `reset` clears this equilibrium. Use one solver
+    per control loop, and do not share a solver between threads.
     """
 
     def __init__(self, robot: Robot, model: CableModel | str | None = None, start: PoseLike | None = None) -> None:
@@ -86,7 +85,7 @@ class ForwardSolver:
             (
                 robot.freedom,
                 body_table(robot),
-                cable_table(robot),
+                cable_table(robot, slanted=True),
                 *(locked(array.view()) for array in (self._lengths, self._start, self._wrench)),
             ),
             new_chain(m, robot.degrees_of_freedom),
@@ -102,13 +101,13 @@ class ForwardSolver:
         self.reset(start)
 
     def reset(self, start: PoseLike | None = None) -> None:
-        """Clear the last pose. The next step starts at the given pose, or searches.
+        """Clear the last pose. The next step starts at `start`, or searches its pose.
 
         Args:
             start: Initial pose of the next step; with None, the next step searches its pose.
 
         Raises:
-            InvalidValueError: If `start` is a batch, or not a pose.
+            InvalidValueError: If `start` is not a single pose.
         """
         self._lost = start is None
         if start is not None:
@@ -126,7 +125,7 @@ class ForwardSolver:
             A new result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If a length is not positive, or not longer than its dead length; the message names the
+            InvalidValueError: If a length is not positive, or not longer than its dead length: the message names the
                 cable. If a shape is wrong.
         """
         lengths = self._checked(unstrained_length)
@@ -141,17 +140,17 @@ class ForwardSolver:
             quaternion,
             self._found.results[tables.TENSION, 0].copy(),
             status,
-            float(numbers[STIFFNESS_MIN]),
-            float(numbers[FORCE_RESIDUAL]),
-            float(numbers[MOMENT_RESIDUAL]),
+            float(numbers[tables.STIFFNESS_MIN]),
+            float(numbers[tables.FORCE_RESIDUAL]),
+            float(numbers[tables.MOMENT_RESIDUAL]),
         )
 
     def _checked(self, unstrained_length: ArrayLike) -> Array:
-        """Checked lengths (m,), positive and finite. For few numbers, it is fastest to check them as a list."""
+        """Check that lengths (m,) are positive and finite. For few numbers, a check of a list is fastest."""
         given, shape = unstrained_length, self._lengths.shape[1:]
         if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape:
             values = given.tolist()
-            if min(values) >= SMALLEST and sum(values) < LARGEST:  # the sum is NaN if a length is NaN
+            if min(values) >= SMALLEST and sum(values) < LARGEST:  # if one length is NaN, the sum is NaN
                 return given
         lengths = checked(unstrained_length, "unstrained_length", "m", shape=shape, above=0.0)
         if lengths.ndim != 1:
@@ -162,9 +161,9 @@ class ForwardSolver:
     def step_into(
         self, unstrained_length: Array, position: Array, quaternion: Array, wrench: Array | None = None
     ) -> ForwardStatus:
-        """Solve one sample and fill given arrays, without allocation after the first solved pose.
+        """Solve one sample and fill the caller's arrays. After the first solved pose, no memory is allocated.
 
-        The status reports a wrong length or wrench; no error is raised.
+        A wrong length or wrench raises no error, but is reported by the status.
 
         Args:
             unstrained_length: L [m], shape (m,).

@@ -1,4 +1,4 @@
-"""Homing: zeros of counts and lengths from a pose with known tensions."""
+"""Homing: zeros of counts and lengths, determined at a pose with known tensions."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_missing_chords
 
 _CATENARY = Catenary()
-MISSED: Final = 1e-9  # largest relative error of a tension; a cable with a larger error cannot have this tension
-# largest accepted strain, above that of any rope; a larger strain is due to a wrong unit of a measured value
+MISSED: Final = 1e-9  # a cable cannot have a given tension if its tension differs by more than this, relative
+# largest accepted strain, more than any rope allows; a larger strain means a wrong unit
 LARGEST_STRAIN: Final = 0.5
 HALVINGS: Final = 50  # largest number of bisections for the smallest tension of a cable
 PRECISION: Final = 1e-4  # relative precision of this smallest tension
@@ -57,7 +57,7 @@ def home(
     Raises:
         InvalidValueError: If the robot has no winches, or its winches have guides. If `pose` is a batch or has the
             wrong type. If a value exceeds load_cell_range, a tension is too small or too large for its cable at this
-            pose, or a length off a drum exceeds cable_length; the message names the cable.
+            pose, or a length off a drum exceeds cable_length: the message names the cable.
         CableGeometryError: If the ends of a cable coincide at this pose, or its platform end is inside its pulley.
 
     Examples:
@@ -108,7 +108,7 @@ def home(
 
 
 def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
-    """Tensions from the load cell values `reading`; refuses impossible tensions."""
+    """Tensions from the load cell values `reading`. Refuse impossible tensions."""
     bias, gain = winches.load_cell_bias, winches.load_cell_gain
     tension, strongest = (reading - bias) / gain, LARGEST_STRAIN * robot.cables.axial_stiffness
     cell = np.full(reading.shape, np.inf) if winches.load_cell_range is None else winches.load_cell_range
@@ -126,7 +126,7 @@ def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
 
 
 def _lengths(robot: Robot, pose: Array, tension: Array, model: CableModel) -> tuple[Array, Flags]:
-    """Unstrained lengths off the drums at a pose row, and True for each cable that reaches its given tension."""
+    """Unstrained lengths off the drums at the pose row `pose`, and True for each cable that can have its `tension`."""
     m = robot.cable_count
     held, length = np.empty(m), np.empty(m)
     table, body = cable_table(robot)[0], body_table(robot)[0]
@@ -136,7 +136,7 @@ def _lengths(robot: Robot, pose: Array, tension: Array, model: CableModel) -> tu
 
 
 def _least_tension(robot: Robot, pose: Array, model: CableModel, cable: int, low: float) -> float | None:
-    """Smallest tension >= `low` that cable `cable` can have at a pose row; None if there is none."""
+    """Smallest tension >= `low` that `cable` can have at the pose row `pose`; None if no such tension exists."""
     high = LARGEST_STRAIN * float(robot.cables.axial_stiffness[cable])
 
     def can(tension: float) -> bool:
@@ -149,4 +149,4 @@ def _least_tension(robot: Robot, pose: Array, model: CableModel, cable: int, low
             break
         middle = math.sqrt(low * high)
         low, high = (low, middle) if can(middle) else (middle, high)
-    return high * (1.0 + PRECISION)  # rounded up, so that the number in the message, with five digits, is large enough
+    return high * (1.0 + PRECISION)  # rounded up to five digits, so that the number in the message is sufficient

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import brief, callback, choice, flag
-from sagline.core.arrays import Array, exactly, locked, number
+from sagline.core.arrays import Array, Indices, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
 from sagline.core.numbers import n
@@ -20,14 +20,15 @@ from sagline.core.progress import Progress
 from sagline.kernels import codes
 from sagline.kinematics import inverse_rows
 from sagline.kinematics.forward_rows import Winding, checked_winding
-from sagline.kinematics.inverse_rows import Given
+from sagline.kinematics.inverse_rows import Given, InverseRows
 from sagline.kinematics.plan import Plan
+from sagline.kinematics.slanted import solve_slanted_axes
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
-from sagline.robot.batch import first_of, has_routing, one_a_pose
+from sagline.robot.batch import first_of, has_routing, has_slanted_axes, one_a_pose
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose, PoseLike, pose_of
-from sagline.robot.reach import check_plane, check_reach
+from sagline.robot.reach import ROUNDING, check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
@@ -35,7 +36,10 @@ from sagline.statics.tables import pose_rows, refuse_missing_chords, robot_terms
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
 from sagline.tension.methods import DEFAULT, method_of
 
-# relative to the fastest cable; a slower cable counts as at rest, because rates are accurate to 1e-8
+if TYPE_CHECKING:
+    from sagline.kernels.inverse.poses import Robots as RobotTerms
+
+# a cable counts as at rest below this share of the fastest cable's rate, because rates are accurate to 1e-8
 STANDING: Final = 1e-7
 _CATENARY = Catenary()
 
@@ -58,9 +62,9 @@ def inverse(
 
     Args:
         robot: The robot, with m cables and n degrees of freedom. With m < n the platform is underconstrained: m values
-            of the pose are given, and the others follow from the balance. Or a sequence of N robots, one per pose. The
-            robots must have the same number of cables, motion pattern, plane normal, type of tension limits and
-            gravity; all other data may differ.
+            of the pose are given, and its other values follow from the force balance. Or a sequence of N robots, one
+            per pose. The robots must have the same number of cables, motion pattern, plane normal, type of tension
+            limits and gravity; all other data may differ.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
         tension: Tension distribution method. `Closest` keeps its reference only along a path; in a batch of poses, each
@@ -74,13 +78,13 @@ def inverse(
             the directions. Friction affects only wrapped and dead lengths. None: no friction.
         stability: True to check the stability of every equilibrium. False saves about a tenth of the time; the status
             UNSTABLE is then not used.
-        given: The m values of an underconstrained platform: names of "x", "y", "z" (position of the platform origin),
-            "yaw" (angle about z) and "level" (tension level). None: x, y, z with three cables, also level with four.
-            The other values of the pose are only the start of the search. Along a path, each search starts at the
-            previous sample.
+        given: The m values of an underconstrained platform: names out of "x", "y", "z" (position of the platform
+            origin), "yaw" (angle about z) and "level" (tension level). None: x, y, z with three cables, and level with
+            a fourth. All other values of the pose are only the start of the search. Along a path, each search starts at
+            the previous sample.
         level: Tension level of an underconstrained platform [N]: component of the chord tensions along the unit vector
             of the tensions that have the least effect on the platform.
-        progress: Function that is called several times per second. Its arguments are the number of finished poses and
+        progress: Function that is called several times per second. The arguments are the number of finished poses and
             the number of all poses. A pose is finished if it is solved, or infeasible for a known reason.
 
     Returns:
@@ -90,9 +94,9 @@ def inverse(
 
     Raises:
         InvalidValueError: If `given` does not fit a robot with fewer cables than degrees of freedom. If `tension` does
-            not support the number of cables. If several robots do not fit together; the message names the property. If
-            `winding` is "path" for poses without times. If an argument has the wrong type or shape. If a pose is
-            outside the motions of the robot's pattern. If the poses need more memory than is free.
+            not support the number of cables. If several robots do not fit together: the message names the property that
+            differs. If `winding` is "path" for poses without times. If an argument has the wrong type or shape. If a
+            pose is outside the motions of the robot's pattern. If the poses need more memory than is free.
         CableGeometryError: If a cable has no chord at some pose, because its ends coincide or its platform end is
             inside its pulley.
 
@@ -107,31 +111,39 @@ def inverse(
         True [11.049 10.542  9.674  9.829  8.49   7.85   9.453  9.402]
     """
     motion, model, tension = _motion_of(motion), model_of(model), method_of(tension)
-    callback(progress, "progress")
-    stability = flag(stability, "stability")
+    stability, progress = flag(stability, "stability"), callback(progress, "progress")
     turning = _given_winding(winding, motion)
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion
     robots = one_a_pose(robot, len(pose) if pose.shape else None)
     shared = first_of(robots)
-    check_reach(shared, pose, "pose")
-    check_plane(shared, pose, "pose")
+    _check_poses(robots, pose)
     values = inverse_rows.given_codes(shared, given)
     options = kernel_options(robots, model, method) if values is None else None
     rows, path = pose_rows(pose), motion if isinstance(motion, Path) else None
-    check_poses(len(rows), shared.cable_count, has_routing(robots))
-    load = external_wrench(wrench, len(rows) if pose.shape else None)
-    if path is not None:
-        load = locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
+    load = _load_of(robots, pose, path, wrench)
     loads = np.atleast_2d(load)
-    if options is None:
-        asked = values, number(level, "level", "N"), path is not None, stability
-        found, rows = inverse_rows.solve_underconstrained_rows(robots, model, rows, loads, *asked, progress)
-        pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
-    else:
+    slanted = has_slanted_axes(robots)
+    reference, proves = None, stability and not slanted
+    if options is not None:
         reference = _reference(shared, previous, tension.variable)
-        found = inverse_rows.solve_inverse_rows(robots, method, options, rows, loads, reference, stability, progress)
-        inverse_rows.decide_rows(robot_terms(robots), options, rows, loads, found, progress)
+
+    def solve(terms: RobotTerms, which: Indices | None = None, repeated: bool = False) -> tuple[InverseRows, Array]:
+        """Results of the poses `which` for the robot arrays `terms`, and rows of the found poses."""
+        at, report = slice(None) if which is None else which, None if repeated else progress
+        some, acting = locked(rows[at]), locked(loads[at] if len(loads) > 1 else loads)
+        if options is None or reference is None:
+            asked = values, number(level, "level", "N"), path is not None, proves, report
+            return inverse_rows.solve_underconstrained_rows(robots, model, some, acting, *asked, terms)
+        found = inverse_rows.solve_inverse_rows(
+            robots, method, options, some, acting, reference.copy(), proves, report, terms
+        )
+        inverse_rows.decide_rows(terms, options, some, acting, found, report)
+        return found, some
+
+    found, rows = solve_slanted_axes(robots, model, pose, solve, stability) if slanted else solve(robot_terms(robots))
+    if options is None:
+        pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(robots, pose)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
@@ -150,8 +162,22 @@ def inverse(
     return plan if winding is None or turning is not None else _with_path_friction(plan)
 
 
+def _check_poses(robots: Robot | tuple[Robot, ...], pose: Pose) -> None:
+    """Refuse poses that are out of reach, or outside the plane of a planar robot, or too many."""
+    shared = first_of(robots)
+    check_reach(shared, pose, "pose")
+    _check_plane(shared, pose, "pose")
+    check_poses(len(pose) if pose.shape else 1, shared.cable_count, has_routing(robots))
+
+
+def _load_of(robots: Robot | tuple[Robot, ...], pose: Pose, path: Path | None, wrench: ArrayLike | None) -> Array:
+    """External wrench, plus the inertial wrench of a path, shape (6,) or (N, 6)."""
+    load = external_wrench(wrench, len(pose) if pose.shape else None)
+    return load if path is None else locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
+
+
 def _plan_of(state: Equilibrium, path: Path | None, tension: TensionMethod, found: inverse_rows.InverseRows) -> Plan:
-    """Plan of solved rows, in the shape of the poses."""
+    """Plan from the rows `found`, with the shape of the poses."""
     shared, shape = first_of(state.robot), state.pose.shape
     return Plan(
         state=state,
@@ -169,8 +195,34 @@ def _plan_of(state: Equilibrium, path: Path | None, tension: TensionMethod, foun
     )
 
 
+def _check_plane(robot: Robot, pose: Pose, item: str) -> None:
+    """Refuse poses of a planar robot at which the cables would not be in the plane of the frame anchors."""
+    away = _out_of_plane(robot, pose)
+    if (outside := np.flatnonzero(np.abs(away) > ROUNDING)).size:
+        k = int(outside[0])
+        name = f"{item}[{k}]" if pose.shape else item
+        value = f"{away[k]:.6g} m along plane_normal from the plane of the frame anchors"
+        step = "Project the poses onto the plane, or choose another motion_pattern of the robot."
+        raise InvalidValueError(name, value, f"0 m, by motion_pattern {robot.motion_pattern}", step)
+
+
+def _out_of_plane(robot: Robot, pose: Pose) -> Array:
+    """Signed distances (N,) [m] between the plane of the platform ends and the plane of the frame ends.
+
+    The distances are zero for a robot that is not planar, or whose frame ends or platform ends are not in one plane.
+    """
+    away = np.zeros(len(np.atleast_2d(pose.position)))
+    if robot.plane_normal is None:
+        return away
+    frame, platform = robot.frame_anchors @ robot.plane_normal, robot.platform_anchors @ robot.plane_normal
+    if np.ptp(frame) > ROUNDING or np.ptp(platform) > ROUNDING:
+        return away
+    distance: Array = np.atleast_2d(pose.position) @ robot.plane_normal + platform[0] - frame[0]
+    return distance
+
+
 def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
-    """Equilibrium at a pose or a batch `pose`. If a single pose is infeasible, raises an error with the shortfall."""
+    """Equilibrium at `pose`, a pose or a batch. An infeasible single pose raises an error that names the shortfall."""
     plan = inverse(robot, pose)
     if not plan.state.pose.shape and not plan.feasible:
         why, short = PoseStatus(int(plan.status)), float(plan.shortfall)
@@ -180,7 +232,7 @@ def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
 
 
 def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
-    """Checked winding directions of the caller; None if `winding` is None or "path"."""
+    """Check the winding directions of the caller. Returns None if `winding` is None or "path"."""
     if not isinstance(winding, str):
         return winding
     if choice(winding, "winding", ("path",)) and isinstance(motion, Path):
@@ -190,7 +242,7 @@ def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | 
 
 
 def _with_path_friction(plan: Plan) -> Plan:
-    """The plan with friction; its length changes determine the directions of winding."""
+    """The plan with friction. The directions of winding follow from the length changes of the plan."""
     if plan.state.contact is None or plan.length_rate is None:
         return plan
     rate = np.nan_to_num(plan.length_rate)
@@ -206,13 +258,13 @@ def _motion_of(motion: Path | PoseLike) -> Path | Pose:
 
 
 def _in_world(components: Array, robot: Robot) -> Array:
-    """Wrenches (N, 6) from components along the free motions (N, n); einsum is faster than thin products."""
+    """Wrenches (N, 6) from components (N, n) along the free motions; einsum is faster here than matrix products."""
     wrench: Array = np.einsum("pi,ij->pj", components, robot.freedom)
     return wrench
 
 
 def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
-    """Initial reference (m,): the tensions `previous`, or those of its last solved pose; NaN if there are none."""
+    """Initial reference tensions (m,): `previous`, or the last solved tensions of this plan; NaN if none exist."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):

@@ -1,9 +1,9 @@
-"""Inverse kinematics as arrays: arguments of the kernels, and their results."""
+"""Inverse kinematics as arrays: arguments and results of the kernels."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,49 +12,56 @@ from sagline.core.arguments import brief, choice
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
-from sagline.kernels import codes, tables
-from sagline.kernels.forward.sensitivity import stabilities_of_poses
-from sagline.kernels.inverse.feasibility import ENOUGH, PROVED, decide_poses
-from sagline.kernels.inverse.poses import Answers, ModelTerms, inverse_poses
-from sagline.kernels.inverse.poses import Robots as RobotTerms
-from sagline.kernels.inverse.underconstrained import LEVEL, YAW, underconstrained_poses
+from sagline.kernels import (
+    codes,
+    decide_poses,
+    inverse_poses,
+    stabilities_of_poses,
+    tables,
+    underconstrained_poses,
+)
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import Robots, first_of, has_routing
+from sagline.robot.equilibrium import result_rows
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF, Options, TensionMethod, takes_default_kernel
 
-UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # statuses of poses without a result from the iterations
+if TYPE_CHECKING:
+    from sagline.kernels.inverse.poses import Answers, ModelTerms
+    from sagline.kernels.inverse.poses import Robots as RobotTerms
+
+UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # statuses of poses without a result of the iterations
 SOLVED = (codes.POSE_SOLVED, codes.UNPROVED_STABILITY)  # statuses of poses with a result
-BLOCK = 1 << 12  # poses per block of the solution, which takes at most 0.1 s; interrupts are handled between blocks
-DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes longer per pose
+BLOCK = 1 << 12  # poses per block of the iterations; it takes at most 0.1 s, and interrupts are handled after it
+DECIDED = 1 << 10  # poses per block of the feasibility decision, which needs more time per pose
 
 
 class InverseRows(NamedTuple):
-    """Results and proofs of N poses. The first axis has the length N, except in results (RESULT_ROWS, N, m)."""
+    """Results and proofs of N poses. The first axis has the length N; `results` has the shape (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
     residuals: Array
     needed: Array
     pose_status: Codes
-    # Smallest change of the force that makes the pose feasible [N]: lower bound and sufficient value, (N, 2). The
+    # Smallest change of the force that makes the pose feasible [N]: lower bound and sufficient value, (N, 2). Both
     # values are 0 at a solved pose, and NaN if the load is not the cause of the failure.
     brackets: Array
-    # sufficient change of the force, along the free motions [N], (N, n); NaN if it is not needed or not known
+    # sufficient change of the force [N], along the free motions, (N, n); NaN if no change is needed or known
     reliefs: Array
     farkas: Array  # Farkas vectors along the free motions, (N, n)
     blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
-    at_border: Flags  # True for poses that `decide_rows` solved in place of the tension distribution method, (N,)
+    at_border: Flags  # True for poses that the tension distribution method did not solve, but `decide_rows` did, (N,)
 
     @classmethod
     def empty(cls, robot: Robots, count: int) -> InverseRows:
-        """Arrays for `count` poses. The results are empty; the proofs are NaN or False."""
+        """New arrays for `count` poses. The results are not initialized; the proofs are NaN or False."""
         shared = first_of(robot)
         m, n = shared.cable_count, shared.degrees_of_freedom
         return cls(
-            np.empty((tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS, count, m)),
+            np.empty((result_rows(robot), count, m)),
             np.empty((count, m), dtype=np.int8),
             np.empty((count, 2)),
             np.empty((count, n)),
@@ -67,7 +74,7 @@ class InverseRows(NamedTuple):
         )
 
     def reject_slack(self, lengths: Array) -> bool:
-        """Mark solved poses as TOO_SLACK if `lengths` (N, m) between guides are NaN. True if a pose is marked."""
+        """Set TOO_SLACK at solved poses where `lengths` (N, m) between guides are NaN. True if such a pose exists."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
         lost = np.isin(self.pose_status, SOLVED) & slack.any(axis=-1)
         if not lost.any():
@@ -81,18 +88,18 @@ class InverseRows(NamedTuple):
 
     @property
     def shortfall(self) -> Array:
-        """Smallest known sufficient change of the force [N], (N,); infinite if a proof shows that none exists."""
-        proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
+        """Smallest known sufficient change of the force [N], (N,); infinite if a proof shows that none suffices."""
+        proved, enough = self.brackets[:, tables.PROVED], self.brackets[:, tables.ENOUGH]
         return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
 
     @property
     def answers(self) -> Answers:
-        """Plain tuple of the results, as kernels require."""
+        """The results as a plain tuple, which the kernels require."""
         return self.results, self.cable_status, self.residuals, self.needed, self.pose_status
 
     @property
     def proofs(self) -> tuple[Array, Array, Array, Flags]:
-        """Plain tuple of the proofs, as the kernel requires."""
+        """The proofs as a plain tuple, which the kernel requires."""
         return self.brackets, self.reliefs, self.farkas, self.blocking
 
 
@@ -105,14 +112,17 @@ def solve_inverse_rows(
     reference: Array,
     stability: bool = False,
     progress: Progress | None = None,
+    terms: RobotTerms | None = None,
 ) -> InverseRows:
-    """Run the kernel over pose rows (N, POSE_COLUMNS) with external plus inertial wrenches `loads` (1 or N, 6)."""
+    """Run the kernel over pose rows (N, POSE_COLUMNS). `loads`: external plus inertial wrenches, (1 or N, 6)."""
     # reference: initial tensions of `Closest`, in its variable, or NaN: (m,) for the first pose, (N, m) for each pose
     # independently; stability: True to mark solved poses without a proof of stability as UNPROVED_STABILITY; progress:
-    # called after each block with the number of finished poses, without undecided poses, and the number of all poses
+    # called after each block with the number of finished poses (undecided poses do not count) and the number of all
+    # poses; terms: from `robot_terms`, if they are not those of `robot`
     found, last = InverseRows.empty(robot, len(rows)), np.array(np.atleast_2d(reference)[0])
     memory, otherwise = memory_for(last.size), None if takes_default_kernel(method) else True
-    given = (*options, robot_terms(robot), rows, loads, last, memory, otherwise, stability, found.answers)
+    terms = robot_terms(robot) if terms is None else terms
+    given = (*options, terms, rows, loads, last, memory, otherwise, stability, found.answers)
     done = 0
     for part in blocks(len(rows), BLOCK if reference.ndim == 1 else 1):
         if reference.ndim > 1:
@@ -125,16 +135,17 @@ def solve_inverse_rows(
 
 
 def covers_all(method: int, redundant: int) -> bool:
-    """True if a method solves every feasible pose with `redundant` spare cables; closed-form methods do not."""
+    """True if `method` solves every feasible pose with `redundant` redundant cables. Closed-form methods do not."""
     return redundant == 0 or not codes.CLOSED_FORM <= method <= codes.PUNCTURE
 
 
 def decide_rows(
     terms: RobotTerms, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
 ) -> None:
-    """Decide the feasibility of poses without a result of the iterations. Fill their proofs and results."""
+    """Decide the feasibility of poses at which the iterations gave no result. Fill their proofs and results."""
     # terms: from `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6);
-    # progress: called after each block with the number of finished poses, with feasible poses, and of all poses
+    # progress: called after each block with the number of finished poses, including feasible poses, and the number of
+    # all poses
     count, n = found.needed.shape
     m = found.cable_status.shape[1]
     found.brackets[np.isin(found.pose_status, SOLVED)] = 0.0
@@ -151,19 +162,19 @@ def decide_rows(
 
 
 def decide_stability(robot: Robots, model: ModelTerms, rows: Array, found: InverseRows) -> None:
-    """Decide the stability of solved poses without a proof of it. Unstable poses get the status UNSTABLE."""
+    """Decide the stability of solved poses that have no proof of stability. Unstable poses get the status UNSTABLE."""
     which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | found.at_border))
     if not which.size:
         return
-    given = ((*model, has_routing(robot) or None), robot_terms(robot), rows)
+    given = ((*model, has_routing(robot) or None), robot_terms(robot, slanted=True), rows)
     memory = memory_for(found.cable_status.shape[1])
     for part in blocks(which.size, BLOCK):
         stabilities_of_poses(*given, which[part], memory, found.results, found.pose_status)
 
 
 Given = Literal["x", "y", "z", "yaw", "level"]
-CODES: Final[dict[str, int]] = {"x": 0, "y": 1, "z": 2, "yaw": YAW, "level": LEVEL}
-_DEFAULT: Final = (*"xyz", "level")  # the first m of these, with three or four cables
+CODES: Final[dict[str, int]] = {"x": 0, "y": 1, "z": 2, "yaw": codes.YAW, "level": codes.LEVEL}
+_DEFAULT: Final = (*"xyz", "level")  # defaults with three or four cables: the first m of these names
 
 
 def given_codes(robot: Robot, given: Sequence[Given] | None) -> Indices | None:
@@ -201,19 +212,21 @@ def solve_underconstrained_rows(
     chained: bool,
     stability: bool,
     progress: Progress | None = None,
+    terms: RobotTerms | None = None,
 ) -> tuple[InverseRows, Array]:
     """Results of underconstrained poses, and rows of the found poses (N, POSE_COLUMNS)."""
     # rows: rows of the given poses; loads: external plus inertial wrenches (1 or N, 6); given: codes (m,); level:
-    # tension level [N]; chained: True to start each pose at the pose before; stability: True to mark solved poses as
-    # UNPROVED_STABILITY
-    assert given is not None  # checked by the caller
+    # tension level [N]; chained: True to start each pose at the previous result; stability: True to give solved poses
+    # the status UNPROVED_STABILITY; terms: from `robot_terms`, if they are not those of `robot`
+    assert given is not None  # the caller has checked this
     shared = first_of(robot)
     found, poses = InverseRows.empty(robot, len(rows)), np.empty_like(rows)
-    terms = (model.code, *model.parameters), (LIMITS_OF[shared.tension_limits_of], np.nan), robot_terms(robot)
+    own = robot_terms(robot) if terms is None else terms
+    arguments = (model.code, *model.parameters), (LIMITS_OF[shared.tension_limits_of], np.nan), own
     memory = memory_for(shared.degrees_of_freedom)
     arrays = (found.answers, poses, found.blocking)
     for part in blocks(len(rows), BLOCK):
-        underconstrained_poses(*terms, rows, loads, given, level, chained, memory, *arrays, part.start, part.stop)
+        underconstrained_poses(*arguments, rows, loads, given, level, chained, memory, *arrays, part.start, part.stop)
         if progress is not None:
             progress(part.stop, len(rows))
     solved = found.pose_status == codes.POSE_SOLVED

@@ -33,18 +33,18 @@ from sagline.tension.methods import DEFAULT, method_of
 ARRAY: Final = np.ndarray  # a module-level name is faster than an attribute of another module
 FLOAT: Final = np.dtype(np.float64)
 WHOLE: Final = slice(None)
-_STATUSES = tuple(sorted(PoseStatus))  # status of each code; this lookup takes a tenth of the time of a conversion
-# A struct accepts exactly this number of real numbers. It is faster than the assignment of a tuple to an array.
+_STATUSES = tuple(sorted(PoseStatus))  # status of each code; a lookup takes a tenth of the time of a conversion
+# A struct accepts exactly the right number of real numbers, and is faster than the assignment of a tuple to an array.
 _POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
-QUATERNION_TOLERANCE = 1e-6  # largest relative deviation of the length of a quaternion, as in `Pose.from_quaternion`
+QUATERNION_TOLERANCE = 1e-6  # largest deviation of the length of a quaternion from 1, as in `Pose.from_quaternion`
 _PLAIN = (tuple, list)
-ROUNDING = 1e-15  # relative deviation of the length below which no normalization is needed
+ROUNDING = 1e-15  # no normalization is needed below this deviation
 
 
 def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
     """Copy a caller's numbers into a `memoryview` (k,) of float64; the solver checks that they are finite."""
-    # A memoryview accepts only an array of equal type and size. This check takes tens of nanoseconds, less than a numpy
-    # copy.
+    # A memoryview accepts only an array of equal type and size. This check takes tens of nanoseconds, which is less
+    # than a numpy copy takes.
     try:
         if given.__class__ is ARRAY:
             memory[WHOLE] = given
@@ -64,7 +64,7 @@ def copy_out(values: Array, out: Any, item: str) -> None:
         if out.dtype is FLOAT or out.dtype == FLOAT:
             out[WHOLE] = values
             return
-    # the target is not an array, has another shape, or is write-locked
+    # the target is not an array, or has another shape, or is write-locked
     except (AttributeError, IndexError, TypeError, ValueError):
         pass
     allowed = f"a writable array of float64 of shape ({values.size},)"
@@ -72,7 +72,7 @@ def copy_out(values: Array, out: Any, item: str) -> None:
 
 
 class InverseStep(NamedTuple):
-    """Result of one pose. Its numbers are NaN at a pose without a solution, but not at an unstable equilibrium.
+    """Result of one pose. All numbers are NaN at a pose without a solution. An unstable equilibrium has numbers.
 
     Attributes:
         unstrained_length: L [m], shape (m,).
@@ -94,8 +94,8 @@ class InverseStep(NamedTuple):
 class InverseSolver:
     """Solver for successive poses, prepared once.
 
-    The solver owns its work arrays. For `Closest` it stores the last feasible tensions, which `reset` clears. Use one
-    solver per control loop, and do not share a solver between threads.
+    The solver owns its work arrays. For `Closest`, the solver stores the last feasible tensions. `reset` clears these
+    tensions. Use one solver per control loop, and do not share a solver between threads.
 
     Examples:
         >>> import sagline as sl
@@ -141,7 +141,7 @@ class InverseSolver:
         self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
         self._found = InverseRows.empty(robot, 1)
-        # reading it takes a fifth of the time of reading an array of one element
+        # reading this memory takes a fifth of the time of reading an array of one element
         self._status = self._found.pose_status.data
         self._loaded = False  # True if the wrench of the last step was not zero
         self._lengths = self._found.results[tables.LENGTH, 0]
@@ -180,7 +180,7 @@ class InverseSolver:
             A new result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If an argument is not finite or has the wrong shape, or the length of the quaternion
+            InvalidValueError: If an argument is not finite or has the wrong shape. If the length of the quaternion
                 differs from 1 by more than 1e-6.
         """
         load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
@@ -205,11 +205,11 @@ class InverseSolver:
     def step_into(
         self, position: ArrayLike, quaternion: ArrayLike, out: Array, wrench: ArrayLike | None = None
     ) -> PoseStatus:
-        """Solve one pose and fill the array `out`, without allocation. The status reports wrong numbers.
+        """Solve one pose and fill `out`, without allocation of memory. The status reports wrong numbers.
 
         Args:
             position: Position of the platform origin [m], shape (3,).
-            quaternion: Rotation platform -> world, scalar last, of length 1 within 1e-6 (then normalized), shape (4,).
+            quaternion: Rotation platform -> world, scalar last, shape (4,). Length 1 within 1e-6; normalized.
             out: Filled with the unstrained lengths [m], shape (m,), or with NaN at a pose without a solution.
             wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for
                 zero.
@@ -265,13 +265,13 @@ class InverseSolver:
                 raise TypeError
             out[WHOLE] = self._lengths
         except (AttributeError, IndexError, TypeError, ValueError):
-            copy_out(self._lengths, out, "out")  # this converts the numbers, or raises an error with the reason
+            copy_out(self._lengths, out, "out")  # this call converts the numbers, or raises an error with the reason
         status: PoseStatus = _STATUSES[code]
         return status
 
     def _normalized(self, length: float) -> bool:
         """Normalize the quaternion in place if its length is close enough to 1."""
-        if not abs(length - 1.0) <= QUATERNION_TOLERANCE:  # also true for NaN
+        if not abs(length - 1.0) <= QUATERNION_TOLERANCE:  # the condition is also true for NaN
             return False
         self._pose[0, 3:] /= length
         return True

@@ -18,22 +18,22 @@ from sagline.kernels import tables
 from sagline.kinematics.inverse_rows import solve_inverse_rows
 from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path, spline_rates
-from sagline.robot.batch import Robots, first_of
+from sagline.robot.batch import Robots, first_of, has_slanted_axes
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, is_underconstrained, turn_in_words
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import inertial_wrench
-from sagline.statics.stiffness import smallest_stiffness
 from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
 SHARE = 1e-5  # step relative to the time scale of the motion; central differences are then accurate to 1e-9
-# factor of the step for one-sided differences, whose rounding errors are four times as large; accurate to 1e-8
+# factor of the step for one-sided differences, because their rounding errors are four times as large; they are accurate
+# to 1e-8
 ONE_SIDED = 4.0
 LONGEST = 1e-2  # largest step relative to the time between samples
-_CONSTANT = 1e-9  # smaller differences of a wrench, relative to its largest component, count as zero
+_CONSTANT = 1e-9  # differences of a wrench below this share of its largest component count as zero
 
 
 class Gap(NamedTuple):
@@ -43,8 +43,8 @@ class Gap(NamedTuple):
         first: Index of the first pose.
         last: Index of the last pose.
         status: Reason for the missing solution at the first pose, or UNSTABLE.
-        shortfall: Largest finite shortfall in the gap [N]; infinite if all shortfalls are infinite, NaN if none is
-            known.
+        shortfall: Largest finite shortfall in the gap [N]. Infinite if all shortfalls are infinite, NaN if no shortfall
+            is known.
         cables: Indices of the cables whose limits oppose the wrench at any pose of the gap.
         hopeless: Number of poses of the gap that no change of the force alone makes feasible.
     """
@@ -66,20 +66,20 @@ class Plan(Result, Saved, Tabular):
         path: The path of the plan; None for poses without times.
         tension: Tension distribution method.
         status: Codes of `PoseStatus`, shape () or (N,).
-        shortfall: Smallest change of the force on the platform that makes the pose feasible [N], shape () or (N,); 0
-            for a feasible pose, infinite if a proof shows that no change of the force alone is sufficient, NaN if the
-            force is not the cause or no value was found.
-        wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
-            shape (2,) or (N, 2).
-        blocking: True for cables at a limit that opposes the needed wrench, shape (m,) or (N, m); a wider limit would
+        shortfall: Smallest change of the force on the platform that makes the pose feasible [N], shape () or (N,). The
+            shortfall is 0 for a feasible pose, infinite if a proof shows that no change of the force alone is
+            sufficient, and NaN if the force is not the cause or no value was found.
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] along the platform's free motions, shape
+            (2,) or (N, 2).
+        blocking: True for cables at a limit that opposes the needed wrench, shape (m,) or (N, m). A wider limit would
             reduce the shortfall.
         farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN at other poses. Let y = farkas. J is the
             structure matrix, s_i(tau_i) is the sag force of cable i, and G_i s_i is its wrench. Along y, the cables
             supply the sum of y . (J_i tau_i - G_i s_i(tau_i)). For all chord tensions within their limits, this sum is
-            less than y . (needed without its sag forces). The proof uses exact catenaries. It excludes tensions below a
-            tenth of the cable's weight, and, for a cable without an upper limit, tensions that stretch it to more than
-            twice its length. The force part of y has length 1, so that the difference is in newtons. NaN if the proof
-            needs more than one direction. None for a plan from an old file.
+            less than y . (needed without its sag forces). The proof uses exact catenaries. The proof excludes tensions
+            below a tenth of the cable's weight, and, for a cable without an upper limit, tensions that stretch it to
+            more than twice its length. The force part of y has length 1, so that the difference is in newtons. NaN if
+            the proof needs more than one direction. None for a plan from an old file.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6), due to weight, given wrench,
             and the sag forces T_z - tau sin phi. Without a solution, the sag forces belong to the tensions with the
             smallest unbalanced wrench. None for a plan from an old file.
@@ -88,8 +88,8 @@ class Plan(Result, Saved, Tabular):
         relief: Change of the force that makes the pose feasible, in world axes [N], shape (3,) or (N, 3). Its magnitude
             is the sufficient value in `bracket`. NaN if no change is needed or known. None for a plan from an old file.
         at_border: True for feasible poses at which the iterations found no tensions, close to the border of
-            feasibility, shape () or (N,). Their tensions balance the platform, but the tension distribution method did
-            not select them. None for a plan from an old file.
+            feasibility, shape () or (N,). The tensions at such poses balance the platform, but the tension distribution
+            method did not select the tensions. None for a plan from an old file.
     """
 
     _columns: ClassVar[Columns] = (
@@ -167,8 +167,8 @@ class Plan(Result, Saved, Tabular):
     def length_rate(self) -> Array | None:
         """Rate dL/dt of `unstrained_length` along the path [m/s], shape (N, m); None without a path.
 
-        The rate is due to platform motion and tension changes; NaN where the plan has no solution. It is computed at
-        each call. See docs/model.md, section 7.
+        The rate is due to platform motion and tension changes; NaN where the plan has no solution. Each call computes
+        the rates again. See docs/model.md, section 7.
         """
         return None if self.path is None else _length_rate(self.state, self.path, self.tension, self.feasible)
 
@@ -178,8 +178,10 @@ class Plan(Result, Saved, Tabular):
 
         A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass,
         as in `ForwardSolution`. The value is zero or negative for an unstable equilibrium, NaN for a pose without a
-        solution and for straight cables. It is computed at each call.
+        solution and for straight cables. Each call computes the value again.
         """
+        from sagline.statics.stiffness import smallest_stiffness  # not needed for a plan alone
+
         return smallest_stiffness(self.state)
 
     @property
@@ -194,10 +196,10 @@ class Plan(Result, Saved, Tabular):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings: rotations that are not free, nearly infeasible poses, a cable model outside its validity."""
+        """Warnings: rotations that are not free, nearly infeasible poses, and a cable model beyond its validity."""
         robot, count, cables = first_of(self.state.robot), self.status.size, self.state.cables
         found = []
-        # the rotation is equal at all poses; `inverse` refuses other poses
+        # all poses have the same rotation, because `inverse` refuses other poses
         turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]
         if np.linalg.norm(turn) > ROUNDING:
             found.append(
@@ -236,18 +238,19 @@ class Plan(Result, Saved, Tabular):
 
 
 def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
-    """Rates of the unstrained lengths (N, m) along `path`; NaN without a solution.
+    """Rates of the unstrained lengths (N, m) along `path`; NaN where the plan has no solution.
 
-    They are accurate to 1e-8 of the largest rate, and of first order in the step at the border of feasibility.
+    The rates are accurate to 1e-8 of the largest rate. At the border of feasibility, the rates have first order.
     """
     # Geometry and tensions both change: L(t) = L(pose(t), tau(t)). The tensions of most methods depend only on the
-    # pose. They are computed again shortly before and after each sample, at poses that the path's twist, twist rate and
-    # jerk determine. `Closest` depends on its previous tensions. It is solved again one and two steps after each
-    # sample, both times relative to the tensions at the sample. At a discontinuity of the rate, for example where a
-    # cable reaches a limit, the value belongs to one side of the discontinuity. The rates of an underconstrained
-    # platform follow from a spline through its lengths. See docs/model.md, section 7.
+    # pose. They are computed again shortly before and after each sample, at poses that follow from twist, twist rate
+    # and jerk of the path. `Closest` depends on its previous tensions. It is solved again one step and two steps after
+    # each sample, in both cases relative to the tensions at the sample. At a discontinuity of the rate, for example
+    # where a cable reaches a limit, the value belongs to one side of the discontinuity. The rates of an
+    # underconstrained platform follow from a spline through its lengths. See docs/model.md, section 7.
     kept, rates = np.flatnonzero(feasible), np.full(state.cables.shape, np.nan)
-    if is_underconstrained(first_of(state.robot)):  # the platform also turns, and the path does not contain this turn
+    # the platform also turns by an angle that the path does not contain, or the exit points need passes of their own
+    if is_underconstrained(first_of(state.robot)) or has_slanted_axes(state.robot):
         for part in np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1):
             if len(part) > 1:
                 rates[part] = spline_rates(path.time[part], state.unstrained_length[part])[0]
@@ -268,14 +271,14 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
         return with_routing(Equilibrium(state.robot, pose, wrench, *reached), state.contact.winding).unstrained_length
 
     now, after = state.unstrained_length, lengths(step)
-    if closest:  # a backward step would cross the active limits
+    if closest:  # a step backward would cross active limits
         best = (4.0 * after - lengths(2.0 * step) - 3.0 * now) / (2.0 * step)
         one_sided = [after - now]
     else:
         before = lengths(-step)
         best = (after - before) / (2.0 * step)
         one_sided = [after - now, now - before]
-    for change in one_sided:  # at the border of feasibility, only one side has a solution: first order
+    for change in one_sided:  # first order, at the border of feasibility: only one side has a solution
         best = np.where(np.isnan(best), change / step, best)
     rates[kept] = best[kept]
     return locked(rates)
@@ -284,9 +287,9 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
 def _motion_near(
     robot: Robots, path: Path, wrench: Array, longer: float
 ) -> tuple[Callable[[float], tuple[Pose, Array]], float]:
-    """Function that gives poses and wrenches at a time after each sample of `path`, and a time step [s]."""
-    # wrench: external plus inertial wrench at the samples (N, 6), whose external part is interpolated by a spline;
-    # longer: factor of the step
+    """A function that returns poses and wrenches at a time after each sample of `path`, and a time step [s] for it."""
+    # wrench: external plus inertial wrench at the samples, (N, 6); a spline interpolates its external part; longer:
+    # factor of the step
     jerk = path.jerk if path.jerk is not None else _rate(path.time, path.twist_rate)
     external = wrench - inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
     changing = float(np.ptp(external, axis=0).max()) > _CONSTANT * float(np.abs(wrench).max())
@@ -298,7 +301,7 @@ def _motion_near(
         inertial = inertial_wrench(robot, pose, twist, path.twist_rate + h * jerk)
         return pose, inertial + external + h * external_rate
 
-    # a small share of the time for a change by 1 m or 1 rad, and of the time between samples
+    # a small share of two times: for a change by 1 m or 1 rad, and between samples
     sizes = (float(np.abs(rate).max()) for rate in (path.twist, path.twist_rate, jerk))
     quickest = max(size ** (1.0 / order) for order, size in enumerate(sizes, start=1))
     between = float(np.diff(path.time).min()) if len(path) > 1 else 1.0
@@ -310,7 +313,7 @@ def _rate(time: Array, values: Array) -> Array:
 
 
 def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
-    """Poses after the time `h`: third order in position, second order in orientation (third for a fixed axis)."""
+    """Poses after the time `h`. The order is 3 for positions, and 2 for orientations (3 if the axis is constant)."""
     from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
     move = h * (path.twist + 0.5 * h * (path.twist_rate + h / 3.0 * jerk))

@@ -23,7 +23,7 @@ from sagline.tension.method import Options, Variable, check_sharing, kernel_opti
 from sagline.tension.methods import Centroid, MinimumNorm
 from sagline.tension.polygon import Side, TensionPolygon
 
-MERGED = 1e-10  # corners with a smaller distance, relative to the largest tension, are merged
+MERGED = 1e-10  # corners are merged if their distance is below this share of the largest tension
 
 _CATENARY = Catenary()
 
@@ -107,7 +107,7 @@ def polygon_at(
 def _sides_of(
     count: int, null: Array, limits: Array, corners: Array, labels: Indices
 ) -> tuple[Array, tuple[Side | None, ...]]:
-    """Vertices (h, r) of the polygon, and the limit that forms each side."""
+    """Vertices (h, r) of the polygon, and for each side the limit that forms it."""
     r, m = null.shape
     origin, low, high = limits[bounds.START], limits[bounds.LOW], limits[bounds.HIGH]
     if r == 0 or count == 0:
@@ -136,7 +136,7 @@ def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) ->
 
 
 def _tensions(vertices: Array, null: Array, origin: Array) -> Array:
-    """Tensions at the vertices; at an infinite vertex, only tensions that the null space does not change are finite."""
+    """Tensions at the vertices. At an infinite vertex, only tensions that the null space does not change are finite."""
     with np.errstate(invalid="ignore"):
         steps = vertices[:, :, None] * null
     moved = np.where(null == 0.0, 0.0, steps)

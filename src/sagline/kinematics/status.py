@@ -36,7 +36,7 @@ class PoseStatus(Status):
         "the feasible tensions are unbounded, so they have no center; give tension_max, or choose MinimumNorm",
     )
     NO_POSE = (
-        100,  # set by the caller, because kernels never get invalid poses
+        100,  # the callers of kernels set this status, because kernels never get invalid poses
         "the value is not a pose: a number is not finite, or the quaternion is not of length 1; give a position and "
         "a unit quaternion, scalar last",
     )

@@ -21,7 +21,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
 Winding = Literal["constant", "remembered"]
-LARGEST: Final = 2.0**53  # [counts]; floats do not represent larger whole numbers exactly
+LARGEST: Final = 2.0**53  # [counts]; larger whole numbers are not exact as floats
 
 
 def encoder_counts(
@@ -42,7 +42,7 @@ def encoder_counts(
         Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no solution.
 
     Raises:
-        InvalidValueError: If required data of winches or cables are missing; the message names them. If the remaining
+        InvalidValueError: If required data of winches or cables are missing: the message names them. If the remaining
             cable does not fit on a drum or is too short. If `creep` is given for a plan without a path.
 
     Examples:
@@ -97,7 +97,7 @@ def lengths_from_counts(
         robot: A robot whose winches have a drum, counts, and the zeros of counts and lengths.
         counts: Encoder counts, shape (m,) or (N, m); NaN if unknown.
         winding: Same as in `encoder_counts`; "remembered" requires drum_tension.
-        drum_tension: Tension of the cables at the drum for each sample [N], of the shape of counts; only for
+        drum_tension: Tension of the cables at the drum for each sample [N], with the shape of `counts`. Only for
             winding="remembered". For a plan, use `winch_rates(plan).drum_tension`.
         temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K].
 
@@ -106,7 +106,7 @@ def lengths_from_counts(
         `Creep.strain` of the plan's times and `chord_tension`.
 
     Raises:
-        InvalidValueError: If required data of winches or cables are missing; the message names them. If `counts` are
+        InvalidValueError: If required data of winches or cables are missing: the message names them. If `counts` are
             beyond the end of a drum or have the wrong shape. If `drum_tension` is missing.
 
     Examples:
@@ -140,7 +140,7 @@ def lengths_from_counts(
 
 
 def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array, *, unstrained: bool) -> Array:
-    """Lengths (N, m) if the cable on the drums keeps the tension with which it was wound."""
+    """Lengths (N, m) for a cable that keeps, on the drum, the tension with which it was wound."""
     strain = np.atleast_2d(tension / robot.cables.axial_stiffness)
     if (loose := strain <= -1.0).any():
         p, i = (int(index) for index in np.argwhere(loose)[0])
@@ -180,18 +180,18 @@ class WinchRates(Result, Tabular):
     """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no solution.
 
     Drum speeds are positive while cable is paid out. Motor quantities are positive if the encoder on the motor shaft
-    counts up. With a positive gear both signs agree. A motor that holds a cable at rest then has a negative torque.
+    counts up. With a positive gear both signs agree, and a motor that holds a cable at rest has a negative torque.
 
     Attributes:
         drum_speed: Speed of the drum [rad/s].
         motor_speed: Speed of the motor's shaft [rad/s]: drum_speed times gear.
         motor_acceleration: Acceleration of the motor's shaft [rad/s^2], from differences of the length rates at the
-            samples; the jump at the end of a layer is not included.
+            samples. The jump at the end of a layer is not included.
         drum_tension: Tension of the cable where it leaves the drum [N], with friction if the plan has winding
             directions.
         motor_torque: Torque of the motor at its shaft [N m]: inertia torque, minus the torque of the cable tension
-            (tension times lever divided by gear), plus the friction torque against the motion (zero at rest). None if
-            the inertia of the winches is unknown.
+            (tension times lever divided by gear), plus the torque against friction (zero at rest). None if the inertia
+            of the winches is unknown.
         count_rate: Count rate of the encoder [1/s]; None if counts_per_turn is not known.
         too_fast: True where motor_speed exceeds the winches' speed_limit; None if the limit is not known.
         too_strong: True where motor_torque exceeds the winches' torque_limit; None if torque or limit is not known.
@@ -225,11 +225,11 @@ class WinchRates(Result, Tabular):
 def winch_rates(plan: Plan) -> WinchRates:
     """Speeds and torques of the winches along a plan, and the samples at which a winch exceeds a limit.
 
-    The lever of the cable is the change of its length per drum turn divided by 2 pi, so that power is conserved. It
-    differs from the pitch radius of the layer for two reasons. The pitch of the helix adds about 0.01 %. The moving
-    exit adds the groove pitch times the slant of the cable. For a groove pitch of 4 mm and an exit 40 mm off center at
-    a distance of 0.8 m, this is 0.06 %. The cable on the drums is at winding_tension. If neither groove_pitch nor the
-    diameter of the cables is known, the lever is drum_radius, as in `fastest`.
+    The lever of the cable is the change of its length per drum turn divided by 2 pi, so that power is conserved. The
+    lever differs from the pitch radius of the layer for two reasons. The pitch of the helix adds about 0.01 %. The
+    motion of the exit along the drum adds the groove pitch times the slant of the cable. For a groove pitch of 4 mm and
+    an exit 40 mm off center at a distance of 0.8 m, this is 0.06 %. The cable on the drums is at winding_tension. If
+    neither groove_pitch nor the diameter of the cables is known, the lever is drum_radius, as in `fastest`.
 
     Args:
         plan: A plan along a path, of a robot whose winches have drum_radius. If groove_pitch is known, the diameter of
@@ -240,7 +240,7 @@ def winch_rates(plan: Plan) -> WinchRates:
         Speeds and torques of the winches at every sample.
 
     Raises:
-        InvalidValueError: If `plan` has no path. If data are missing; the message names them. If the remaining cable
+        InvalidValueError: If `plan` has no path. If data are missing: the message names them. If the remaining cable
             does not fit on a drum.
 
     Examples:
@@ -289,7 +289,7 @@ def winch_rates(plan: Plan) -> WinchRates:
 
 
 def _levers(robot: Robot, length: Array) -> tuple[Winch, Array, Array]:
-    """The winches, the stretch factor of the cable on the drums, and the levers of the cables (N, m) [m]."""
+    """The winches, the stretch factor of the cable on the drums, and the levers of the cables [m], (N, m)."""
     winches, cables = robot.winches, robot.cables
     bare = cables.diameter is None and winches is not None and winches.groove_pitch is None
     if bare and winches is not None and winches.drum_radius is not None:
@@ -305,10 +305,10 @@ def _exceeds(values: Array | None, limit: Array | None) -> Flags | None:
 
 
 def _differences(time: Array, values: Array) -> Array:
-    """Rates of values (N, m) within each range of consecutive valid samples; NaN for an isolated sample."""
+    """Rates of `values` (N, m), computed separately in each range of valid samples; NaN for a range of one sample."""
     found = np.full(values.shape, np.nan)
     kept = np.isfinite(values).all(axis=-1)
-    gradient: Any = np.gradient  # the type annotations do not support arrays with two axes
+    gradient: Any = np.gradient  # the type annotations of the library do not support arrays with two axes
     edges = np.flatnonzero(np.diff(np.concatenate(([False], kept, [False])).astype(np.int8))).reshape(-1, 2)
     for first, end in edges:
         if end - first > 1:

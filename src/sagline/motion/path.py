@@ -1,4 +1,4 @@
-"""Path: poses, velocities and accelerations at each sample, also from timed poses by splines."""
+"""Path: poses, velocities and accelerations over time; construction of a path from timed poses by splines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sagline.robot.pose import Pose, PoseLike, pose_of
 
 @frozen(eq=False, repr=False, weakref_slot=False)
 class Path(Shown, Tabular):
-    """Motion of the platform frame over time, in N samples.
+    """Motion of the platform frame over time, at N samples.
 
     Attributes:
         time: Time of each sample [s], shape (N,), strictly increasing.
@@ -27,11 +27,11 @@ class Path(Shown, Tabular):
         twist_rate: Acceleration of the platform's origin [m/s^2] and angular acceleration [rad/s^2], in world axes,
             shape (N, 6).
         jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None if unknown, for example for sampled poses.
-        rests: Times at which the platform rests between two segments, including the first and last time [s], shape
-            (R,), strictly increasing. They can be between samples. None if unknown, for example for sampled poses.
+        rests: Times [s] at which the platform is at rest between two segments, including the first and the last time,
+            shape (R,), strictly increasing. A rest can be between two samples. None if unknown.
 
     Raises:
-        InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
+        InvalidValueError: If the times do not increase, if a number is not finite, or if the numbers of samples differ.
     """
 
     _columns: ClassVar[Columns] = (
@@ -79,14 +79,14 @@ class Path(Shown, Tabular):
 
 
 def checked_time(time: ArrayLike, item: str = "time") -> Array:
-    """Check the sample times [s], strictly increasing, shape (N,) with N >= 1; return a locked copy."""
+    """Read-only copy of strictly increasing sample times [s], shape (N,), N >= 1; raises an error for other times."""
     clock = checked(time, item, "s", shape=(None,))
     if clock.ndim != 1 or clock.size == 0:
         raise InvalidValueError(item, f"of shape {clock.shape}", "shape (N,), N >= 1", "Give one time for each sample.")
     late = np.flatnonzero(np.diff(clock) <= 0.0)
     if late.size:
         k = int(late[0]) + 1
-        allowed, step = f"> {clock[k - 1]} s (the one before)", "Sort the samples by time."
+        allowed, step = f"> {clock[k - 1]} s, the previous time", "Sort the samples by time."
         raise InvalidValueError(f"{item}[{k}]", f"{clock[k]} s", allowed, step)
     return clock
 
@@ -94,7 +94,7 @@ def checked_time(time: ArrayLike, item: str = "time") -> Array:
 def _checked_rests(rests: ArrayLike, clock: Array) -> Array:
     times = checked_time(rests, "rests")
     if times.size < min(2, clock.size) or times[0] != clock[0] or times[-1] != clock[-1]:
-        allowed = f"times from {clock[0]} s to {clock[-1]} s, the first and the last sample's"
+        allowed = f"times from {clock[0]} s to {clock[-1]} s, the times of the first and the last sample"
         raise InvalidValueError("rests", f"from {times[0]} s to {times[-1]} s", allowed, "Give all rests, or None.")
     return times
 
@@ -105,27 +105,26 @@ def _length_error(item: str, shape: tuple[int, ...], samples: int) -> InvalidVal
 
 
 def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
-    """Path from timed poses.
+    """Create a path from timed poses.
 
-    Cubic splines with continuous second derivatives interpolate position and quaternion. They give the velocities and
-    accelerations; the poses are unchanged. At each end, a single cubic goes through the outermost four samples
-    (not-a-knot). The path can therefore start and end in motion. Two samples give a constant velocity, and three
-    samples give a parabola.
+    Cubic splines through positions and quaternions give the velocities and accelerations. The poses are unchanged. At
+    each end, one cubic interpolates the outermost four samples (not-a-knot condition), so that a path can begin and end
+    in motion. Two samples give a constant velocity, and three samples give a parabola.
 
-    Errors of the samples reduce the accuracy of the acceleration. Position errors up to d [m] at time steps of h [s]
-    cause acceleration errors up to 12 d/h^2. For positions rounded to micrometers (d = 0.5e-6 m) and 100 samples/s,
-    this is 0.06 m/s^2.
+    Small errors of the samples cause large errors of the acceleration: position errors up to d [m] at time steps of h
+    [s] cause acceleration errors up to 12 d/h^2. Example: positions in whole micrometers (d = 0.5e-6 m) at 100
+    samples/s cause errors up to 0.06 m/s^2.
 
     Args:
         time: Time of each sample [s], shape (N,), strictly increasing, N >= 2.
-        pose: The N poses; the rotation between consecutive poses is less than 180 degrees.
+        pose: N poses, with rotations of less than 180 degrees between consecutive poses.
 
     Returns:
-        Path with the given times and poses; its jerk is None, because a cubic spline does not define it.
+        Path with the given times and poses. The jerk is None, because a cubic spline does not define a jerk.
 
     Raises:
-        InvalidValueError: If the times do not increase, there are less than two times, or the number of poses is
-            different.
+        InvalidValueError: If the times do not increase, or are fewer than two; if the numbers of times and poses
+            differ.
 
     Examples:
         >>> import numpy as np
@@ -148,15 +147,15 @@ def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
 
 
 def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
-    """First and second derivatives of the cubic spline through the values (N, ...), at its knots (N,)."""
-    from scipy.interpolate import CubicSpline  # this import takes longer than the rest of the folder motion
+    """First and second time derivatives of the cubic spline through `values` (N, ...), at the times (N,)."""
+    from scipy.interpolate import CubicSpline  # slow import, only needed here
 
     spline = CubicSpline(time, values, bc_type="not-a-knot")
     return spline(time, 1), spline(time, 2)
 
 
 def _without_sign_changes(quaternion: Array) -> Array:
-    """Make quaternions continuous: each gets the sign closer to its predecessor (q and -q are the same rotation)."""
+    """Quaternions without sign changes between consecutive samples; q and -q are the same rotation."""
     aligned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) >= 0.0
     sign = np.cumprod(np.concatenate(([1.0], np.where(aligned, 1.0, -1.0))))
     continuous: Array = quaternion * sign[:, None]
@@ -164,21 +163,21 @@ def _without_sign_changes(quaternion: Array) -> Array:
 
 
 def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
-    """Angular velocity [rad/s] and acceleration [rad/s^2] in world axes of a spline through unit quaternions.
+    """Angular velocity [rad/s] and angular acceleration [rad/s^2] in world axes of a spline through quaternions.
 
     The normalized quaternion has q' = (omega, 0) q / 2, and |q| = 1 at the samples. The derivatives of the spline
     therefore give omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
 
-    scipy's RotationSpline is not used, because its first and last velocities are means over the outermost steps. The
-    acceleration at both ends is therefore wrong, even with small steps.
+    RotationSpline of scipy is not used, because its accelerations at both ends are wrong, even with small steps: its
+    first and last velocities are means over the outermost steps.
     """
     rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
-    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of the norm, which varies along a spline
+    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of |q|, which is not constant along a spline
     return velocity, 2.0 * _vector_of_product_with_conjugate(curvature, quaternion) - 2.0 * growth * velocity
 
 
 def _vector_of_product_with_conjugate(a: Array, b: Array) -> Array:
-    """Vector part of the quaternion product a b*, scalars last, shapes (N, 4) -> (N, 3)."""
+    """Vector part (N, 3) of the quaternion products a b*; quaternions (N, 4) with the scalar last."""
     vector: Array = b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])
     return vector

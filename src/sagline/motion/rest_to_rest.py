@@ -1,4 +1,4 @@
-"""Rest-to-rest motion through waypoints with polynomials of 5th or 7th degree."""
+"""Rest-to-rest motions through waypoints, with polynomials of 5th or 7th degree."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from sagline.robot.pose import Pose, PoseLike, pose_of
 
 @dataclass(frozen=True, slots=True)
 class RestProfile:
-    """Polynomial that increases from 0 to 1 for s from 0 to 1. Its first k derivatives vanish at both ends.
+    """Polynomial that increases from 0 at s = 0 to 1 at s = 1, with k derivatives that are zero at both ends.
 
-    Its derivative is c u^k with u = s (1 - s), integrated by the binomial theorem; docs/model.md, section 7.
+    The derivative of the polynomial is c u^k with u = s (1 - s). See docs/model.md, section 7.
 
     Attributes:
-        order: k, >= 2. It is 2 for the quintic (no acceleration at the ends) and 3 for the septic (also no jerk).
-        tail: Coefficients of the polynomial divided by s^(k + 1), constant first.
+        order: Number k, >= 2: 2 for the quintic (no acceleration at the ends), 3 for the septic (also no jerk).
+        tail: Coefficients of the polynomial divided by s^(k + 1), in ascending powers of s.
     """
 
     order: int
@@ -32,7 +32,7 @@ class RestProfile:
 
     @classmethod
     def of_order(cls, order: int) -> RestProfile:
-        """Create the profile whose first `order` derivatives vanish at both ends."""
+        """Create the profile with the first `order` derivatives equal to zero at both ends."""
         k = order
         scale = factorial(2 * k + 1) // factorial(k) ** 2
         binomials = (factorial(k) // factorial(i) // factorial(k - i) for i in range(k + 1))
@@ -40,30 +40,30 @@ class RestProfile:
 
     @property
     def slope(self) -> float:
-        """Constant c = (2 k + 1)!/(k!)^2, for which the integral of c u^k is one."""
+        """Constant c = (2 k + 1)!/(k!)^2, which makes the integral of c u^k equal to one."""
         return float(factorial(2 * self.order + 1) // factorial(self.order) ** 2)
 
     @property
     def peak_speed(self) -> float:
-        """Largest derivative with respect to s, at s = 1/2: c/4^k."""
+        """Largest derivative of the polynomial by s, which is c/4^k at s = 1/2."""
         return self.slope / 4.0**self.order
 
     @property
     def peak_acceleration(self) -> float:
-        """Largest second derivative: c k u^(k - 1) sqrt(q) with q = (1 - 2 s)^2 = 1/(2 k - 1) and u = (1 - q)/4."""
+        """Largest second derivative by s: c k u^(k - 1) sqrt(q) with q = (1 - 2 s)^2 = 1/(2 k - 1), u = (1 - q)/4."""
         k = self.order
         q = 1.0 / (2 * k - 1)
         return float(self.slope * k * (0.25 * (1.0 - q)) ** (k - 1) * np.sqrt(q))
 
     def share(self, s: Array) -> Array:
-        """Share of the segment covered at s."""
+        """Value of the polynomial at s, which is the share of the segment that is covered."""
         total: Array = np.full_like(s, self.tail[-1])
         for coefficient in self.tail[-2::-1]:
             total = coefficient + s * total
         return s ** (self.order + 1) * total
 
     def rates(self, s: Array) -> tuple[Array, Array, Array]:
-        """First to third derivatives of the share with respect to s. The first k are exactly 0 at both ends."""
+        """First, second and third derivative of the share by s; the first k derivatives are exactly 0 at both ends."""
         k = self.order
         u, bend = s * (1.0 - s), 1.0 - 2.0 * s
         second = self.slope * k * u ** (k - 1) * bend
@@ -74,8 +74,8 @@ class RestProfile:
 QUINTIC: Final = RestProfile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
 SEPTIC: Final = RestProfile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
-STILL = 1e-9  # [m] and [rad]; a smaller motion counts as a rounding error of a waypoint
-BLOCK = 1 << 16  # samples per block, so that temporary arrays have only a few MB
+STILL = 1e-9  # [m] and [rad]; a smaller motion is a rounding error of a waypoint
+BLOCK = 1 << 16  # number of samples per block; temporary arrays then take a few MB
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,13 +83,13 @@ class Segments:
     """S straight segments, each with a rotation about a fixed axis.
 
     Attributes:
-        profile: Profile from rest to rest.
+        profile: Polynomial that gives the share of a segment over time.
         start: Position at the start [m], shape (S, 3).
-        move: Displacement to the end [m], shape (S, 3).
+        move: Displacement between start and end [m], shape (S, 3).
         turn: Rotation vector from start to end in world axes [rad], shape (S, 3).
         start_quaternion: Orientation q at the start, scalar last, shape (S, 4).
-        side_quaternion: Product `side` of the unit rotation axis and q, shape (S, 4). The orientation after a rotation
-            by the angle a is cos(a/2) q + sin(a/2) side.
+        side_quaternion: Quaternion product p of the unit rotation axis and q, shape (S, 4). The orientation after a
+            rotation by the angle a is cos(a/2) q + sin(a/2) p.
     """
 
     profile: RestProfile
@@ -103,15 +103,15 @@ class Segments:
     def between(cls, stops: Pose, profile: RestProfile) -> Segments:
         """Create the segments between consecutive poses of a batch."""
         move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
-        if np.array_equal(kept, stops.quaternion[1:]):  # without a rotation, the axis is not needed
+        if np.array_equal(kept, stops.quaternion[1:]):  # no rotation, so no axis is needed
             return cls(profile, stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
-        from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
+        from scipy.spatial.transform import Rotation  # the import would take a third of the load time of sagline
 
         first, second = stops.rotation[:-1], stops.rotation[1:]
         turn = (second * first.inv()).as_rotvec()
         angle = np.linalg.norm(turn, axis=1, keepdims=True)
         axis = np.where(angle > 0.0, turn / np.where(angle > 0.0, angle, 1.0), (0.0, 0.0, 1.0))
-        # a pure quaternion is a rotation by 180 degrees
+        # a quaternion without scalar part is a rotation by 180 degrees
         half_turn = Rotation.from_quat(np.hstack((axis, np.zeros_like(angle))))
         side = (half_turn * first).as_quat()
         return cls(profile, stops.position[:-1], move, turn, first.as_quat(), side)
@@ -133,7 +133,7 @@ class Segments:
         angular_speed: float | None,
         angular_acceleration: float | None,
     ) -> Array:
-        """Shortest times (S,) [s] of the segments that satisfy all limits, in the order and the units of `LIMITS`."""
+        """Shortest times (S,) [s] of the segments that satisfy all limits; the arguments have the order of `LIMITS`."""
         distance, angle = np.linalg.norm(self.move, axis=1), np.linalg.norm(self.turn, axis=1)
         if (same := (distance <= STILL) & (angle <= STILL)).any():
             k = int(np.argmax(same))
@@ -146,22 +146,21 @@ class Segments:
         return slower
 
     def sampled(self, time: Array, ends: Array, durations: Array) -> Path:
-        """Path at times (N,) [s], from the end times (S,) and the durations (S,) of the segments [s]."""
+        """Path with samples at `time` (N,) [s]; ends, durations: end times and durations (S,) of the segments [s]."""
         starts = np.concatenate(([0.0], ends[:-1]))
         half_angle = 0.5 * np.linalg.norm(self.turn, axis=1, keepdims=True)
         position, quaternion = np.empty((time.size, 3)), np.empty((time.size, 4))
-        rates = np.empty((3, time.size, 6))  # twist and its first and second time derivatives
+        rates = np.empty((3, time.size, 6))  # twist, twist rate, jerk
         for low in range(0, time.size, BLOCK):
             block = slice(low, low + BLOCK)
             k = np.minimum(np.searchsorted(ends, time[block], side="right"), len(self) - 1)
             T = durations[k][:, None]
-            s = np.minimum((time[block] - starts[k])[:, None] / T, 1.0)  # the rounded start times may give more than 1
+            s = np.minimum((time[block] - starts[k])[:, None] / T, 1.0)  # rounded start times can give s > 1
             share = self.profile.share(s)
             move, turn, turned = self.move[k], self.turn[k], share * half_angle[k]
             position[block] = self.start[k] + share * move
             quaternion[block] = np.cos(turned) * self.start_quaternion[k] + np.sin(turned) * self.side_quaternion[k]
-            # because the axis is fixed, the derivatives of the rotation vector are the exact derivatives of the
-            # orientation
+            # The rotation axis is constant: angular velocity and acceleration are derivatives of the rotation vector.
             for order, by_share in enumerate(self.profile.rates(s)):
                 rate = by_share / T ** (order + 1)
                 rates[order, block, :3], rates[order, block, 3:] = rate * move, rate * turn
@@ -172,7 +171,7 @@ class Segments:
     def _least_time(
         self, extent: Array, verb: str, name: str, unit: str, speed: float | None, acceleration: float | None
     ) -> Array:
-        """Shortest times [s] for motions of given extent [m or rad] with two limits (None: no limit)."""
+        """Shortest times [s] for motions with the sizes `extent` [m or rad] within limits of speed and acceleration."""
         if speed is None and acceleration is None and (moves := extent > STILL).any():
             k = int(np.argmax(moves))
             motion = f"{verb} by {extent[k]:.6g} {unit} from waypoints[{k}] to waypoints[{k + 1}]"
@@ -191,8 +190,8 @@ def _limit(value: float | None, item: str, unit: str) -> float:
 
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
-MOST_SAMPLES = 100_000_000  # 21 GB; a larger number probably comes from a wrong unit of a duration or of the rate
-SAMPLE_BYTES = 300.0  # peak memory per sample during construction of the path
+MOST_SAMPLES = 100_000_000  # 21 GB; a larger number suggests a wrong unit of a duration or rate
+SAMPLE_BYTES = 300.0  # [bytes], peak memory per sample during the construction of a path
 _CHECK_UNITS = "Check the units of durations, limits and rate."
 
 
@@ -206,18 +205,18 @@ def quintic_path(
     angular_acceleration: float | None = None,
     rate: float = 100.0,
 ) -> Path:
-    """Path through waypoints, with rest at each waypoint.
+    """Create a path through waypoints with rest at each waypoint and zero acceleration there.
 
-    In a segment of duration T, the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 of the segment at the time s
-    T. It moves along a straight line and rotates about a fixed axis. Velocity and acceleration vanish at both ends; the
-    jerk does not (see `septic_path`). For a rotation of exactly 180 degrees, both directions are equally short. The
-    path uses the direction of scipy's `Rotation.as_rotvec`.
+    At the time s T of a segment of duration T, the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 of the
+    segment. The platform moves along a straight line and rotates about a fixed axis. At both ends of a segment,
+    velocity and acceleration are zero, but the jerk is not (see `septic_path`). A rotation by 180 degrees has the
+    direction of scipy's `as_rotvec`.
 
-    Give either `durations` or limits. With limits, each segment has the shortest duration that satisfies all limits of
+    Give either `durations` or limits. Limits give each segment the shortest duration that satisfies all limits of
     translation and rotation.
 
-    The samples are at 0, 1/rate, 2/rate, ... and at the end time. The last step can therefore be shorter. A waypoint
-    can be between two samples.
+    The samples are at the times 0, 1/rate, 2/rate, ... and at the end. The last time step can be shorter. A
+    waypoint can be between two samples.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
@@ -229,13 +228,12 @@ def quintic_path(
         rate: Samples per second [1/s], > 0.
 
     Returns:
-        Path that starts at time 0. Its jerk is discontinuous at every waypoint. The jerk of a sample at a waypoint is
-        that of the next segment.
+        Path that starts at time 0. The jerk jumps at every waypoint; a sample there has the jerk of the next segment.
 
     Raises:
-        InvalidValueError: If a value is out of range, durations and limits are both given or both missing, a limit is
-            missing for the translation or rotation of a segment, a segment has no sample between its ends, or two
-            consecutive waypoints are equal in a path with limits.
+        InvalidValueError: If a value is out of range; if durations and limits are both given or both missing; if a
+            limit is missing for the translation or rotation of a segment; if a segment has no sample between its ends;
+            if two consecutive waypoints of a path with limits are equal.
 
     Source:
         docs/model.md, section 7.
@@ -261,12 +259,12 @@ def septic_path(
     angular_acceleration: float | None = None,
     rate: float = 100.0,
 ) -> Path:
-    """Path through waypoints, with rest at each waypoint and continuous jerk.
+    """Create a path through waypoints with rest at each waypoint and continuous jerk.
 
-    The function is the same as `quintic_path`, but the share is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7. Velocity,
-    acceleration and jerk are zero at both ends of each segment, so that cables and winches have no sudden changes. For
-    the same duration, the peak speed is 7/6 of the peak speed of `quintic_path`, and the peak acceleration is 1.30
-    times as large.
+    The path is as for `quintic_path`, but with the share 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7. Velocity, acceleration and
+    jerk are zero at both ends of each segment, so that forces and motor torques do not change suddenly. For the same
+    duration, the peak speed is larger than for `quintic_path` by the factor 7/6, and the peak acceleration by the
+    factor 1.30.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
@@ -305,7 +303,7 @@ def _rest_to_rest(
     limits: tuple[float | None, float | None, float | None, float | None],
     rate: float,
 ) -> Path:
-    """Path of segments with one profile and with given durations or limits, which have the order of `LIMITS`."""
+    """Path of segments with the profile `profile`, and with durations or with limits in the order of `LIMITS`."""
     segments = Segments.between(_as_pose(waypoints), profile)
     given = [name for name, value in zip(LIMITS, limits, strict=True) if value is not None]
     if (durations is None) == (not given):
@@ -338,7 +336,7 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
 
 
 def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None:
-    """Refuse a moving segment without a sample between its ends, because all results would lack its motion."""
+    """Refuse a path in which a moving segment has no sample between its ends, so that its motion would be lost."""
     rounding = 1e-9 * ends[-1]
     inside = np.searchsorted(grid, ends - rounding) - np.searchsorted(grid, ends - times + rounding)
     if (unseen := (inside < 1) & moves).any():
@@ -352,29 +350,29 @@ def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None
 
 
 def time_grid(total: float, rate: float) -> Array:
-    """Sample times [s], (N,): k/rate from 0 on, and the total time as the last; total [s]; rate [1/s]."""
+    """Sample times (N,) [s]: 0, 1/rate, 2/rate, ... and the end time `total` [s]; rate [1/s]."""
     rate = number(rate, "rate", "1/s", above=0.0)
     steps = total * rate
     if steps > MOST_SAMPLES:
         value = f"{steps:.3g} ({total:g} s at {rate:g} 1/s)"
         raise InvalidValueError("the number of samples", value, f"<= {MOST_SAMPLES:g}", _CHECK_UNITS)
     check_memory(f"a path of {steps:.4g} samples", SAMPLE_BYTES * steps, _CHECK_UNITS)
-    # no additional last sample, if the total is a multiple of 1/rate except for rounding
+    # if the end time is a multiple of 1/rate, except for rounding, no additional sample is needed
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     return np.append(np.arange(last) / rate, total)
 
 
-HEIGHT = 1.5  # height [m], as in the article
-STOPS = ((0.0, 0.0), (5.0, 3.5), (-5.0, 3.5), (-5.0, -3.5), (5.0, -3.5), (5.0, 3.5), (0.0, 0.0))  # corner x, y [m]
-DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # durations [s]
+HEIGHT = 1.5  # [m], height of the platform in the article
+STOPS = ((0.0, 0.0), (5.0, 3.5), (-5.0, 3.5), (-5.0, -3.5), (5.0, -3.5), (5.0, 3.5), (0.0, 0.0))  # x, y [m]
+DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # durations of the segments [s]
 
 
 def article_path(rate: float = 100.0) -> Path:
-    """Planar motion of the article, at z = 1.5 m and without rotation, from rest to rest.
+    """Create the planar motion of the article at z = 1.5 m, without rotation, with rest at each waypoint.
 
-    The article gives only the height and the zero angles (its Figure 18). All other values are assumed. The path starts
-    at the center, goes to the corner (+5, +3.5) m, counter-clockwise around the rectangle x = +-5 m, y = +-3.5 m, and
-    back to the center. It takes 60 s. Peak acceleration is 0.48 m/s^2, peak speed is 1.70 m/s.
+    The article states only the height and the zero angles (Figure 18). All other values are assumed. The path leads
+    from the center to the corner (+5, +3.5) m, counter-clockwise around the rectangle x = +-5 m, y = +-3.5 m, and back
+    to the center. The motion takes 60 s, with a peak acceleration of 0.48 m/s^2 and a peak speed of 1.70 m/s.
 
     Args:
         rate: Samples per second [1/s], > 0; 100 gives 6,001 poses.

@@ -11,7 +11,7 @@ GOOD, BAD, NEITHER = "#009E73", "#D55E00", "#888888"
 
 
 def html_of(thing: object) -> str | None:
-    """HTML representation for notebooks."""
+    """HTML of the summary and the figure of `thing` for notebooks; None for other objects."""
     found = summary_of(thing)
     if found is None:
         return None
@@ -26,8 +26,8 @@ def html_of(thing: object) -> str | None:
 
 
 def _figure_of(thing: object, description: str) -> str:
-    """HTML of the figure; "" if there is no figure or it cannot be drawn."""
-    with suppress(Exception):  # for example without Matplotlib; then only the summary is shown
+    """HTML of the figure of `thing`; "" if there is no figure, or if drawing fails."""
+    with suppress(Exception):  # without Matplotlib, for example; only the summary is then shown
         from sagline.notebook.figures import drawing_of
 
         return drawing_of(thing, description)

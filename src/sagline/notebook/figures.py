@@ -61,7 +61,7 @@ _family = re.compile(r"font-family: 'DejaVu Sans'(?:, 'DejaVu Sans')?;? ?")
 
 
 def drawing_of(thing: object, description: str) -> str:
-    """HTML of the figure of an object, in the style and colors of the notebook; "" without a figure."""
+    """HTML of the figure of `thing`, in the style and colors of the notebook; "" for an object without a figure."""
     with Using(STYLE):
         figure = figure_of(thing)
         return "" if figure is None else _html(figure, description)
@@ -69,7 +69,7 @@ def drawing_of(thing: object, description: str) -> str:
 
 @singledispatch
 def figure_of(thing: object) -> Figure | None:
-    """Draw a small figure of an object; None for an object without a figure."""
+    """Small figure of `thing`; None for an object without a figure."""
     return None
 
 
@@ -143,7 +143,7 @@ def _(found: Calibration) -> Figure | None:
 def _time_lines(
     clock: Array, axis: str, values: Array, label: str, gaps: Flags, names: tuple[str, ...] | None = None
 ) -> Figure:
-    """Draw lines over time, with at most as many samples as a reader can see."""
+    """Lines of the columns of `values` over `clock`, with at most about `MOST_SAMPLES` samples."""
     figure = sheet(3.2)
     ax = figure.add_subplot()
     chosen = _chosen(values)
@@ -161,7 +161,7 @@ def _time_lines(
 
 
 def _chosen(values: Array) -> Indices:
-    """Select equally spaced samples (N, c), and the samples with the largest and smallest value of each column."""
+    """Indices of equally spaced rows of `values` (N, c), and of the rows with the extreme values of each column."""
     count = len(values)
     if count <= MOST_SAMPLES:
         return np.arange(count, dtype=np.int64)
@@ -178,7 +178,7 @@ def _whole(ax: object) -> Figure | None:
 
 
 def _html(figure: Figure, description: str) -> str:
-    """The figure as SVG, or as PNG if the PNG is smaller. "" if both are too large."""
+    """The figure as SVG, as PNG if the SVG is too large, or "" if both are too large."""
     lines = [line for ax in figure.findobj(lambda each: hasattr(each, "get_lines")) for line in ax.get_lines()]  # type: ignore[attr-defined]
     if sum(len(line.get_xdata()) for line in lines if line.get_marker() not in ("None", None)) > MOST_MARKS:
         for line in lines:
@@ -199,7 +199,7 @@ def _ink(gray: re.Match[str]) -> str:
 
 
 def _themed(svg: str, description: str) -> str:
-    """Convert a drawing to the colors of the page: black to the text color, gray to a transparent text color.
+    """Convert a drawing to the colors of the page: black becomes the text color, gray a transparent text color.
 
     The identifiers are made unique, so that one page can contain several drawings.
     """

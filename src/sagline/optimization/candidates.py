@@ -1,4 +1,4 @@
-"""Candidates of a design search: points of the unit cube, values of the design variables, and robots."""
+"""Candidates of a design search, as points of the unit cube, as values of design variables, and as robots."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
 MOST_SAMPLES = 1000
-COINCIDENT = 1e-9  # two cables coincide if both of their ends are closer than this [m]
+COINCIDENT = 1e-9  # largest distance [m] between the frame ends, and between the platform ends, of coincident cables
 
 
 class Candidates:
-    """All robots that differ from the initial robot only in the design variables."""
+    """Set of candidates: all robots that differ from the initial robot only in the design variables."""
 
     def __init__(self, robot: Robot, free: Sequence[Free], item: str = "free") -> None:
-        """Bind the design variables to the initial robot; `item` is their name in messages."""
+        """Prepare candidates for an initial robot and its design variables; item: name of the variables in messages."""
         self.robot = robot
         self.free = free_parts(free, item)
         self._bound: list[Bound] = [one.bound(robot, f"{item}[{k}]") for k, one in enumerate(self.free)]
@@ -42,11 +42,11 @@ class Candidates:
 
     @property
     def start(self) -> Array:
-        """Design variables of the first robot, shape (d,)."""
+        """Values (d,) of the design variables in the initial robot."""
         return np.array([part.start for part in self.parts])
 
     def units(self, values: Array) -> Array:
-        """Convert design variables (N, d) to points of the unit cube; a choice becomes the middle of its interval."""
+        """Convert design variables (N, d) to points of the unit cube; a choice becomes the center of an interval."""
         span = np.where(self._choices > 0, self._choices, self._high - self._low)
         return np.asarray((values - self._low + 0.5 * (self._choices > 0)) / span)
 
@@ -57,20 +57,20 @@ class Candidates:
         return np.asarray(np.where(self._choices > 0, chosen, inside))
 
     def cables(self, values: Array) -> Array:
-        """Cable tables (N, m, CABLE_COLUMNS) from design variables (N, d)."""
+        """Cable tables (N, m, CABLE_COLUMNS) of candidates with the design variables `values` (N, d)."""
         found = np.repeat(self._table[None], len(values), axis=0)
         self.write(found, values)
         return found
 
     def write(self, cables: Array, values: Array) -> None:
-        """Write design variables (N, d) into cable tables (N, m, CABLE_COLUMNS), in place."""
+        """Change the cable tables `cables` (N, m, CABLE_COLUMNS) in place to the design variables `values` (N, d)."""
         first = 0
         for parts, write in self._bound:
             write(cables, values[:, first : first + len(parts)])
             first += len(parts)
 
     def costs(self, values: Array) -> Array | None:
-        """Cost per meter of cable, shape (N,); None without a catalogue; raises an error if an entry has no cost."""
+        """Cost (N,) per meter of cable; None without a `FreeCable`. Raises an error if the catalogue has no costs."""
         for k, one in enumerate(self.free):
             if isinstance(one, FreeCable):
                 missing = [entry.name for entry in one.catalogue if entry.cost is None]
@@ -82,7 +82,7 @@ class Candidates:
         return None
 
     def robots(self, values: Array, names: Sequence[str]) -> tuple[Robot, ...]:
-        """Robots with design variables (N, d); the constructor of the robot checks the values."""
+        """Robots with the design variables `values` (N, d) and the names `names`; the constructor checks the robots."""
         return tuple(
             self._robot(table, own, name) for table, own, name in zip(self.cables(values), values, names, strict=True)
         )
@@ -114,7 +114,7 @@ class Candidates:
 
 
 def free_parts(free: object, item: str) -> tuple[Free, ...]:
-    """Checked design variables as a tuple; `item` is their name in messages."""
+    """Checked tuple of design variables; item: name of the variables in messages."""
     given = [free] if isinstance(free, Free) else free
     step = 'Give [FreeAnchors("frame", low, high), ...].'
     allowed = "a sequence of FreeAnchors, FreeCable and FreeLimit"
@@ -127,7 +127,7 @@ def free_parts(free: object, item: str) -> tuple[Free, ...]:
 
 
 def impossible(cables: Array) -> Flags:
-    """Mask (N,) of cable tables (N, m, CABLE_COLUMNS): True if cables coincide, or if tension limits contradict."""
+    """True for each table of `cables` (N, m, CABLE_COLUMNS) with coincident cables or contradictory tension limits."""
     ends = cables[..., : tables.PLATFORM_Z + 1]
     first, second = np.triu_indices(cables.shape[1], 1)
     apart = np.abs(ends[:, first] - ends[:, second]).max(axis=-1, initial=0.0)
@@ -136,10 +136,10 @@ def impossible(cables: Array) -> Flags:
 
 
 class PlatformBox:
-    """Box of the platform at G poses; no frame anchor may be inside it."""
+    """Box around the platform at G poses, in which frame anchors are not allowed."""
 
     def __init__(self, robot: Robot, poses: Pose) -> None:
-        """Store the size of the platform; if it is not given, the extent of the platform's anchors."""
+        """Store the size of the platform. If the size is not given, the box contains all platform anchors."""
         low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
         self._half = 0.5 * ((high - low) if robot.platform_size is None else robot.platform_size)
         self._middle = 0.5 * (low + high)
@@ -147,7 +147,7 @@ class PlatformBox:
         self._reach = float(np.linalg.norm(np.abs(self._middle) + self._half))
 
     def holds(self, points: Array) -> Indices:
-        """Index (...) of the first pose at which a point (..., 3) [m] is inside the platform; otherwise -1."""
+        """Index (...) of the first pose at which a point (..., 3) [m] is inside the platform; -1 if none is."""
         flat = points.reshape(-1, 3)
         found = np.full(len(flat), -1)
         low, high = self._position.min(axis=0) - self._reach, self._position.max(axis=0) + self._reach
@@ -158,7 +158,7 @@ class PlatformBox:
         return found.reshape(points.shape[:-1])
 
     def holds_at(self, points: Array, poses: Pose) -> Flags:
-        """Mask (N,) of poses: True if one of the pose's points (N, m, 3) [m] is inside the platform."""
+        """True (N,) for each pose at which any of the points (N, m, 3) [m] of this pose is inside the platform."""
         found = np.zeros(len(points), dtype=np.bool_)
         away = points - poses.position[:, None]
         near = np.flatnonzero((np.abs(away) < self._reach).all(axis=-1).any(axis=-1))
@@ -170,16 +170,16 @@ class PlatformBox:
 
 @frozen(weakref_slot=False)
 class AnchorErrors:
-    """Normally distributed errors of all anchor coordinates; one sample of errors is used for all candidates.
+    """Normally distributed errors of all anchor coordinates. All candidates have the same random errors.
 
     Attributes:
         deviation: Standard deviation of each coordinate [m], > 0.
-        samples: Number of robots with errors for each candidate, 1 to 1000.
-        take: Rule for the value of a candidate: the "worst" or the "mean" value of its samples.
-        seed: Seed of the sample, a whole number >= 0.
+        samples: Number of robots with random errors that represent each candidate, 1 to 1000.
+        take: Value of a candidate: "worst" for the worst value of its samples, "mean" for their mean value.
+        seed: Seed of the random errors, a whole number >= 0.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, or out of range.
+        InvalidValueError: If an argument has a wrong type, or is out of range.
 
     Examples:
         >>> import sagline as sl
@@ -196,16 +196,16 @@ class AnchorErrors:
     __reduce__ = reduced
 
     def added(self, cables: Array) -> Array:
-        """Cable tables of robots with anchor errors.
+        """Add the sample of anchor errors to cable tables.
 
         Args:
             cables: Cable tables of candidates, shape (N, m, CABLE_COLUMNS).
 
         Returns:
-            Cable tables, shape (N, samples, m, CABLE_COLUMNS).
+            Cable tables with errors, shape (N, samples, m, CABLE_COLUMNS).
         """
         many = np.repeat(cables[:, None], self.samples, axis=1)
-        ends = tables.PLATFORM_Z + 1  # the first columns of a table are the coordinates of both ends
+        ends = tables.PLATFORM_Z + 1  # the first columns are coordinates of both ends
         errors = np.random.default_rng(self.seed).standard_normal((self.samples, cables.shape[1], ends))
         many[..., :ends] += self.deviation * errors
         return many

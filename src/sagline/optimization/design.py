@@ -1,4 +1,4 @@
-"""Design search: optimization of a robot's design variables with respect to goals."""
+"""Design search: optimization of the design variables of a robot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagline.optimization.folder import open_record
 from sagline.optimization.free import Free
 from sagline.optimization.front import Front, Ledger
 from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, Goal, Request, poses_of
-from sagline.optimization.search import SEARCHES, latin_hypercube, population_of
+from sagline.optimization.search import SEARCHES, latin_hypercube
 from sagline.robot.pose import PoseBox, PoseLike
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
@@ -45,38 +45,38 @@ def design(
     folder: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Front:
-    """Search for a robot that is better than the given robot, or for a Pareto front of better robots.
+    """Search for a robot that is better than `robot`, or for a Pareto front of better robots.
 
-    The search begins with the robot itself and a random sample of candidates. The same seed gives results that are
-    identical bit by bit. A candidate is dropped, with NaN as its values, if a frame anchor is inside the platform at a
-    pose.
+    The first candidates are the robot itself and random robots. The same seed gives bitwise identical results. A
+    candidate with a frame anchor inside the platform at any pose is dropped; its goal values are NaN.
 
     Args:
         robot: Initial robot of the search.
         free: Design variables: `FreeAnchors`, `FreeCable`, `FreeLimit`.
         goals: Goals, or their names. "cma" and "differential_evolution" optimize the weighted sum of the goals. "nsga2"
             finds a Pareto front, in which no robot is better than another robot in every goal.
-        wrenches: Set of loads at every pose, for example a `WrenchBox`; None for the weight alone.
-        poses: Poses; None for a grid of level poses in a box.
-        box: Box of the grid; None for the robot's test box, level.
+        wrenches: Set of wrenches at every pose, for example a `WrenchBox`; None for the platform's weight alone.
+        poses: Poses; None for a grid of poses without rotation in a box.
+        box: Box of the grid, without tilt; None for the robot's test box without its tilt.
         grid: Number of poses of the grid along x, y and z.
-        inner: Anchors that the machine moves during operation, as `FreeAnchors`. At each pose, these anchors are at
-            the positions with the largest margin.
-        robust: Errors of the anchors; a robot is then rated by robots with such errors. None: exact anchors.
+        inner: Anchors that the machine moves during operation, as `FreeAnchors`. Each pose is rated with the moving
+            anchors at the positions with the largest margin.
+        robust: Errors of the anchors, for the rating of each candidate by robots with random errors. None for exact
+            anchors.
         model: Cable model.
         optimizer: "cma", "differential_evolution" or "nsga2".
-        evaluations: Largest number of robots that are rated.
+        evaluations: Largest number of candidates that are rated.
         seed: Seed of all random numbers.
-        folder: Folder of the rated robots; it is created if its parent folder exists. An interrupted search, or a
-            search with more evaluations, continues from this folder. None: no folder.
-        progress: Function that is called after each generation with the number of rated robots and `evaluations`.
+        folder: Folder that records the rated candidates; it is created if its parent folder exists. A second call with
+            the same arguments continues an interrupted search. None for no record.
+        progress: Function that is called after each generation with the number of rated candidates and `evaluations`.
 
     Returns:
-        Front. If no robot is better, the front contains the initial robot, and `better` is False.
+        Front with the better robots. If there are none, `robots` is the initial robot and `better` is False.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, if the robot does not have a design variable, if its
-            value is outside the bounds, or if the evaluations are too few for two generations.
+        InvalidValueError: If an argument has a wrong type; if the robot does not have a design variable, or has a value
+            outside the bounds; if `evaluations` is too small for two generations.
         FileError: If the folder contains another search, or cannot be written.
 
     Examples:
@@ -98,14 +98,21 @@ def design(
     request = Request(robot, free, goals, wrenches, places, model, inner, robust, optimizer, seed)
     candidates = request.candidates
     dimensions = len(candidates.parts)
-    population = population_of(optimizer, dimensions)
+    population = _population(optimizer, dimensions)
     count = whole_number(evaluations, "evaluations", 1, MOST_EVALUATIONS)
     if count < 2 * population:
         allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
         raise InvalidValueError("evaluations", f"{count:,}", allowed, "Give more evaluations, or fewer variables.")
-    ledger = Ledger(request, candidates, count, progress)  # errors must be raised before any file is written
+    ledger = Ledger(request, candidates, count, progress)  # raises errors before a file is written
     sample = latin_hypercube(population - 1, dimensions, request.seed)
     first = np.concatenate((candidates.units(candidates.start[None]), sample))
     with nullcontext() if folder is None else open_record(folder, request) as ledger.record:
         SEARCHES[request.optimizer](ledger.rate, first, count, request.seed, ledger.costs)
         return ledger.front()
+
+
+def _population(optimizer: str, dimensions: int) -> int:
+    """Number of candidates in the first generation, including the initial robot."""
+    if optimizer == "cma":
+        return 2 * (4 + int(3.0 * np.log(dimensions)))
+    return max(16, 4 * dimensions) if optimizer == "differential_evolution" else max(24, 4 * dimensions)

@@ -1,4 +1,4 @@
-"""Design files: design variables and goals, in YAML."""
+"""Design files in YAML with the arguments of a design search."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ WAYS: Final = ("goal", "maximize", "minimize")
 
 
 def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
-    r"""Read a design file, which has all arguments of `design` except for the robot.
+    r"""Read a design file, which can contain all arguments of `design` except the robot.
 
-    A quantity is a number in SI or a text with its unit:
+    A quantity is a number in SI units, or a text with a number and a unit:
 
         free:
           - frame_anchors: {low: [-1, -1, 0], high: [1, 1, 50 cm], symmetry: xy}
@@ -58,10 +58,10 @@ def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
         file: The file.
 
     Returns:
-        Names and values of the arguments that the file contains.
+        Dictionary of the arguments that the file contains.
 
     Raises:
-        FileError: If the file cannot be read, or a value is wrong; the message names the key and the value.
+        FileError: If the file cannot be read, or if a value is wrong; the message contains key and value.
 
     Examples:
         >>> from pathlib import Path
@@ -125,7 +125,7 @@ class _Free(YamlEntry):
     cable: list[_Choice] = []  # noqa: RUF012 - pydantic copies it
 
     def free(self, item: str) -> Free:
-        """Design variable of the entry."""
+        """Design variable that the entry describes."""
         keys = list(_Free.model_fields)
         given = [key for key in keys if getattr(self, key)]
         if len(given) != 1:
@@ -145,16 +145,16 @@ class _Goal(YamlEntry):
     maximize: str | None = None
     minimize: str | None = None
     weight: Annotated[Any, ""] = 1.0
-    scale: Any = None  # its unit is that of the goal
+    scale: Any = None  # in the unit of the goal
 
     @model_validator(mode="before")
     @classmethod
     def _accept_name(cls, data: object) -> object:
-        """Read an entry that is only the name of a goal."""
+        """Accept an entry that is only the name of a goal."""
         return {"goal": data} if isinstance(data, str) else data
 
     def wanted(self) -> Goal:
-        """Goal of the entry."""
+        """Goal that the entry describes."""
         given = [way for way in WAYS if getattr(self, way) is not None]
         if len(given) != 1:
             value = f"given by {' and '.join(given)}" if given else "missing"
@@ -178,7 +178,7 @@ class _Wrenches(YamlEntry):
     accelerations: _Accelerations | None = None
 
     def wrenches(self) -> WrenchSet:
-        """Box of wrenches, plus the loads of accelerations if the file has them."""
+        """Box of wrenches, to which the inertial forces of accelerations are added if the file has accelerations."""
         center = self.center
         if isinstance(center, list) and len(center) == 6:
             center = [in_si(one, "N" if k < 3 else "N*m", f"center[{k}]") for k, one in enumerate(center)]
@@ -198,7 +198,7 @@ class _Robust(YamlEntry):
     seed: int = 0
 
     def errors(self) -> AnchorErrors:
-        """Sample of anchor errors."""
+        """Anchor errors that the entry describes."""
         return AnchorErrors(self.si("deviation"), samples=self.samples, take=self.take, seed=self.seed)
 
 
@@ -215,7 +215,7 @@ class _Design(YamlEntry):
     seed: int = 0
 
     def arguments(self) -> dict[str, Any]:
-        """Arguments of `design` from the file."""
+        """Arguments of `design` that the file contains."""
         found: dict[str, Any] = {
             "free": [one.free(f"free[{k}]") for k, one in enumerate(self.free)],
             "goals": [_made(f"goals[{k}]", one.wanted) for k, one in enumerate(self.goals)],
@@ -237,7 +237,7 @@ class _Design(YamlEntry):
 
 
 def _made(item: str, make: Callable[[], T]) -> T:
-    """Make an object from a part of the file; errors name this part."""
+    """Call `make` for a part of the file; an error is raised again with the name `item` of the part."""
     try:
         return make()
     except InvalidValueError as error:

@@ -1,9 +1,9 @@
-"""Folder of a design search: rated candidates, from which a search can be continued, and the resulting robots.
+"""Folder of a design search: the record of rated candidates, with which a search continues, and the results.
 
 `design.json` identifies the search by a digest of the request without the number of evaluations. `evaluations.csv` has
-one line with a checksum per candidate; lines are appended after each generation. After a crash, or on a full disk, the
-last line may be incomplete. A continued search removes such a line, and rates its candidate again. `front.csv` and the
-robot files are written at the end.
+one line with a checksum per candidate; lines are appended after each generation. After a crash or on a full disk, the
+last line may be incomplete. A continued search removes an incomplete line and rates the candidate again. `front.csv`
+and the robot files are written at the end.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ ANOTHER: Final = "Give another folder, or remove this one."
 
 
 class DesignFolder:
-    """Record of a design search: K known candidates, (K, d + g), and a file for new candidates."""
+    """Record of a design search: rows (K, d + g) of K known candidates, and a file to which new rows are appended."""
 
     def __init__(self, file: Path, handle: int, known: Array) -> None:
-        """Store an open file and the known candidates."""
+        """Store the path `file`, the open file `handle`, and the rows of the known candidates."""
         self._file, self._handle, self.known = file, handle, known
 
     def add(self, rows: Array) -> None:
-        """Append rows of candidates, design variables and goals, (N, d + g), and flush them to the disk."""
+        """Append rows (N, d + g) with design variables and goal values of candidates, and flush the file."""
         self.add_lines([repr(float(x)) for x in row] for row in rows)
 
     def add_lines(self, lines: Iterable[list[str]]) -> None:
-        """Append lines, each from its cells, and flush them to the disk."""
+        """Append lines, each given as a list of cells, and flush the lines to the disk."""
         data = "".join(map(_line, lines)).encode()
         try:
             while data:
@@ -61,7 +61,7 @@ class DesignFolder:
 
 @contextmanager
 def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
-    """Open a new or an existing record in a folder; raises an error if it is from another search, or in use."""
+    """Open or create the record in `folder`; raises an error if the record is of another search or in use."""
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
     create_folder(place, parents=False)
@@ -88,7 +88,7 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
 
 
 def _canonical(value: Any) -> str:
-    """Text of a value for the digest; different values have different texts."""
+    """Text of a value for the digest. Different values have different texts."""
     if isinstance(value, np.ndarray):
         return f"array({value.dtype.str}, {value.shape}, {np.ascontiguousarray(value).tobytes().hex()})"
     if is_dataclass(value) or attrs.has(type(value)):
@@ -103,7 +103,7 @@ def _canonical(value: Any) -> str:
 
 
 def _check_request(place: Path, digest: str, request: Request) -> None:
-    """Reject the folder if it contains another search."""
+    """Raise an error if the folder contains the record of another search."""
     file = place / REQUEST
     if not exists(file):
         if exists(place / EVALUATIONS):
@@ -121,7 +121,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
 
 
 def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
-    """Rows of the complete lines, and the size of these lines in bytes; an incomplete last line is ignored."""
+    """Rows in the complete lines of `file`, and size of these lines in bytes; an incomplete last line is ignored."""
     none = np.zeros((0, len(heads)))
     lines = read_text(check_file(file), LIMIT).splitlines(keepends=True)
     if not lines:
@@ -135,7 +135,7 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
         right = cells == expected if k == 0 else len(numbers) == len(heads) and None not in numbers
         if not right:
             if k == len(lines) - 1:
-                break  # incomplete line
+                break  # the last line is incomplete
             raise FileError(file, f"line {k + 1} is damaged", ANOTHER, item=f"line {k + 1}")
         whole += len(line.encode())
         if k:
@@ -144,14 +144,14 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
 
 
 def _line(cells: list[str]) -> str:
-    """Line of CSV; its last cell is a checksum of all other cells."""
+    """CSV line with a last cell that contains the checksum of all other cells."""
     text = StringIO()
     csv.writer(text, lineterminator="").writerow(cells)
     return f"{text.getvalue()},{crc32(text.getvalue().encode()):08x}\n"
 
 
 def _cells(line: str) -> list[str] | None:
-    """Cells of a line, without the checksum; None if the checksum is wrong."""
+    """Cells of a CSV line without the checksum; None if the checksum is wrong."""
     text, _, check = line.rpartition(",")
     if not line.endswith("\n") or check != f"{crc32(text.encode()):08x}\n":
         return None

@@ -1,4 +1,4 @@
-"""Design variables and their bounds: cables of a catalogue and tension limits."""
+"""Design variables with bounds: choice of a cable from a catalogue, and tension limits."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from sagline.robot.robot import Robot
 
 
 class DesignVariable(NamedTuple):
-    """One design variable.
+    """One scalar design variable with its bounds.
 
     Attributes:
         name: Name in messages and tables.
-        unit: Unit of the variable; "" if the variable is the index of a choice.
+        unit: Unit of the variable; "" for a variable that is the index of a choice.
         low: Lower bound [unit].
         high: Upper bound [unit].
-        start: Value of the initial robot [unit], within the bounds.
-        choices: Number of choices, whose indices are 0, 1, ...; 0 for a continuous variable.
+        start: Value in the initial robot [unit], within the bounds.
+        choices: Number of choices with the indices 0, 1, ...; 0 for a continuous variable.
     """
 
     name: str
@@ -41,34 +41,34 @@ class DesignVariable(NamedTuple):
     choices: int = 0
 
 
-# Design variables of a part, for one robot: the K variables, and a function that writes their values (N, K) to cable
-# tables (N, m, CABLE_COLUMNS), in place
+# K design variables, and a function that writes values (N, K) of these variables into cable tables (N, m,
+# CABLE_COLUMNS), in place.
 Bound: TypeAlias = tuple[tuple[DesignVariable, ...], Callable[[Array, Array], None]]
 
 
 class Free(ByFields):
-    """Interface of `FreeAnchors`, `FreeCable` and `FreeLimit`."""
+    """Interface of groups of design variables: `FreeAnchors`, `FreeCable` and `FreeLimit`."""
 
     __slots__ = ()
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables for the initial robot of the search.
+        """Design variables of this group for an initial robot.
 
         Args:
             robot: Initial robot of the search.
-            item: Name of the design variable in messages.
+            item: Name of this group in messages.
 
         Returns:
-            The design variables, and the function that writes their values.
+            The design variables, and a function that writes values of the variables into cable tables.
 
         Raises:
-            InvalidValueError: If the robot does not have the variable, or if the robot's value is outside the bounds.
+            InvalidValueError: If the robot does not have a variable, or if the robot's value is outside the bounds.
         """
         raise NotImplementedError
 
 
 def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -> None:
-    """Reject bounds (K,) with low above high; `strictly` also rejects equal bounds."""
+    """Reject bounds (K,) in which `low` is above `high`; with `strictly`, equal bounds are also rejected."""
     for k in np.flatnonzero(low >= high if strictly else low > high):
         where = f"[{k}]" if len(low) > 1 else ""
         allowed = f"< high{where}, {high[k]:g} {unit}" if strictly else f"<= high{where}, {high[k]:g} {unit}"
@@ -76,7 +76,7 @@ def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -
 
 
 def cable_numbers(cables: Any) -> tuple[int, ...]:
-    """Checked cable indices without repetitions; None (all cables) becomes empty."""
+    """Checked cable indices without repetitions; None, which means all cables, becomes an empty array."""
     if cables is None:
         return ()
     step = "Number the cables from 0, or leave out `cables` for all cables."
@@ -87,7 +87,7 @@ def cable_numbers(cables: Any) -> tuple[int, ...]:
 
 
 def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices:
-    """Cable indices, checked for a robot; all cables if none are given."""
+    """Cable indices, each of which exists in `robot`; all cables if `cables` is empty."""
     wrong = [one for one in cables if one >= robot.cable_count]
     if wrong:
         step = f"{robot.name} has {robot.cable_count} cables, numbered from 0."
@@ -96,15 +96,15 @@ def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices
 
 
 def whose_text(cables: Indices, count: int) -> str:
-    """Suffix of a variable's name with the indices of its cables; empty if it concerns all cables."""
+    """Suffix of a variable's name with the indices of the cables; empty if the variable is for all cables."""
     return "" if len(cables) == count else f"[{' '.join(map(str, cables))}]"
 
 
-SAME: Final = 1e-9  # relative tolerance by which the robot's cable and a cable of the catalogue count as equal
+SAME: Final = 1e-9  # relative tolerance of the comparison between the robot's cable and cables of the catalogue
 
 
 def _one_cable(value: Any, item: str) -> Cable:
-    """Checked material of one cable, as numbers."""
+    """Checked material of a single cable: every field is a number."""
     cable = instance(value, Cable, item)
     if cable.linear_density.shape != ():
         shape = f"of shape {cable.linear_density.shape}"
@@ -116,16 +116,16 @@ def _one_cable(value: Any, item: str) -> Cable:
 
 @frozen(eq=False, weakref_slot=False)
 class CableChoice:
-    """A cable of a catalogue.
+    """Cable in the catalogue of a design search.
 
     Attributes:
         name: Name in messages and files.
-        cable: Material of the cable, as numbers.
-        cost: Cost per meter, in any currency, >= 0; None if no goal needs the cost.
-        tension_max: Upper tension limit [N], > 0; None: the limits of the robot.
+        cable: Material of the cable; every field is a number.
+        cost: Cost per meter, in any currency, >= 0. May be None if no goal needs the cost.
+        tension_max: Upper tension limit [N], > 0; None for the limits of the robot.
 
     Raises:
-        InvalidValueError: If the material has values for several cables, or if an argument is of the wrong kind.
+        InvalidValueError: If the material has values for several cables, or if an argument has a wrong type.
     """
 
     name: str = field(metadata=checked_by(label))
@@ -139,10 +139,10 @@ class CableChoice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeCable(Free):
-    """Choice of the material of all cables from a catalogue.
+    """Design variable: choice of one material for all cables from a catalogue.
 
     Attributes:
-        catalogue: The cables. They should be sorted by weight, because the search assumes that neighbors are similar.
+        catalogue: The cables, which should be sorted by weight because the search assumes that neighbors are similar.
     """
 
     catalogue: tuple[CableChoice, ...]
@@ -154,7 +154,7 @@ class FreeCable(Free):
             catalogue: Two or more cables; one of them is the robot's own cable.
 
         Raises:
-            InvalidValueError: If `catalogue` has another form, or if two cables have the same name.
+            InvalidValueError: If `catalogue` is not a sequence of `CableChoice`, or if two cables have the same name.
         """
         given: Any = catalogue
         if not isinstance(given, Sequence) or isinstance(given, str) or len(given) < 2:
@@ -184,7 +184,7 @@ class FreeCable(Free):
 
 
 def _write_cables(catalogue: tuple[CableChoice, ...], cables: Array, values: Array) -> None:
-    """Write the material and the tension limit that the index in the catalogue selects."""
+    """Write material and tension limit of the catalogue's entry with the index `values` into cable tables."""
     which = values[:, 0].astype(np.int64)
     for name, column in (("linear_density", tables.DENSITY), ("axial_stiffness", tables.STIFFNESS)):
         cables[:, :, column] = np.array([getattr(one.cable, name) for one in catalogue])[which, None]
@@ -198,7 +198,7 @@ LIMITS: Final = {"tension_min": tables.TENSION_MIN, "tension_max": tables.TENSIO
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeLimit(Free):
-    """Variable tension limit; its cables all have the same value.
+    """Design variable: tension limit that has the same value for all or some cables.
 
     Attributes:
         which: "tension_min" or "tension_max".
@@ -222,7 +222,7 @@ class FreeLimit(Free):
             cables: Indices of the cables, from 0; None for all.
 
         Raises:
-            InvalidValueError: If low is not below high, or if an argument is of the wrong kind.
+            InvalidValueError: If `low` is not below `high`, or if an argument has a wrong type.
 
         Examples:
             >>> import sagline as sl

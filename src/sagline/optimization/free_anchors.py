@@ -1,4 +1,4 @@
-"""Design variables of anchors: shifts of the anchors in a box or along lines, with or without a symmetry."""
+"""Design variables that shift anchors in a box or along lines, with or without symmetry."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from sagline.robot.robot import Robot
 Symmetry: TypeAlias = str
 MIRRORED: Final = tuple("".join(axes) for count in (1, 2, 3) for axes in combinations("xyz", count))
 NAMES: Final = (*MIRRORED, "turned", "together")
-_ON_PLANE: Final = 1e-9  # tolerance of positions, relative to the extent of the anchors
+_ON_PLANE: Final = 1e-9  # tolerance of the distance from a plane or axis, relative to the extent of the anchors
 
 
 def _symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
-    """Index of each leading anchor, and shifts (K, c, 3) of all anchors if it shifts by a meter along K directions.
+    """Index of each leading anchor, and shifts (K, c, 3) of all anchors if the leading anchor shifts by one meter.
 
-    The index is None for a single leading anchor. An error is raised if an anchor could pass its mirror plane, or if an
-    anchor is on the axis of rotation.
+    A leading anchor determines the shifts of other anchors by symmetry. The index of a single leading anchor is None.
+    Raises an error if an anchor could cross its mirror plane, or is on the axis of rotation.
     """
     count = len(anchors)
     if symmetry is None:
@@ -48,7 +48,7 @@ def _turned(anchors: Array, along: Array, item: str) -> Array:
     away = anchors[:, :2] - anchors[:, :2].mean(axis=0)
     if np.linalg.norm(away, axis=1).min() <= _ON_PLANE * max(float(np.ptp(anchors)), 1.0):
         step = 'Choose "together", or omit the cable with the anchor on the axis.'
-        raise InvalidValueError(f"{item}: symmetry", "'turned' with an anchor on the axis", "no anchor there", step)
+        raise InvalidValueError(f"{item}: symmetry", "'turned' with an anchor on the axis", "no anchor on it", step)
     angle = np.arctan2(away[:, 1], away[:, 0])
     angle -= angle[0]
     shifts = np.repeat(along[:, None, :], len(anchors), axis=1)
@@ -58,7 +58,7 @@ def _turned(anchors: Array, along: Array, item: str) -> Array:
 
 
 def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str) -> Array:
-    """Mirrored shifts (K, c, 3), with the sign of each anchor's side; an anchor on the plane remains on it."""
+    """Shifts (K, c, 3) that are mirrored at planes; an anchor on a mirror plane has no shift across the plane."""
     shifts = np.repeat(along[:, None, :], len(anchors), axis=1)
     for axis in ("xyz".index(name) for name in symmetry):
         low, high = float(anchors[:, axis].min()), float(anchors[:, axis].max())
@@ -66,7 +66,7 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
         away = anchors[:, axis] - plane
         side = np.where(np.abs(away) <= _ON_PLANE * max(high - low, 1.0), 0.0, np.sign(away))
         if side[0] == 0.0:
-            side = np.zeros_like(side)  # the leading anchor is on the plane; it and all others remain there
+            side = np.zeros_like(side)  # the leading anchor is on the plane: no anchor moves across
         lead, side = side[0], side * side[0]
         shifts[..., axis] *= side
         inward = -np.minimum(*(bound * along[:, axis] * lead for bound in bounds)).sum()
@@ -83,25 +83,25 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
 
 
 ENDS: Final = {"frame": tables.FRAME_X, "platform": tables.PLATFORM_X}
-_UNIT: Final = 1e-9  # tolerance of a vector's length
+_UNIT: Final = 1e-9  # tolerance of the length of a unit vector
 _AXES: Final = "xyz"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeAnchors(free.Free):
-    """Variable shifts of anchors from their positions in the robot; the shifts are in a box or along lines.
+    """Design variables: shifts of anchors from their positions in the initial robot, in a box or along lines.
 
-    The dead length of guides is constant during the search; the resulting robots have the correct dead length.
+    During the search, the dead length of guides is constant. The resulting robots have the correct dead length.
 
     Attributes:
         end: "frame" or "platform".
-        low: Lowest shifts [m], shape (K,), <= 0: along x, y, z, or along the directions in `along`.
-        high: Largest shifts [m], shape (K,), >= 0. A coordinate with low = high = 0 is fixed.
+        low: Smallest shifts [m], shape (K,), <= 0: along x, y, z, or along the directions in `along`.
+        high: Largest shifts [m], shape (K,), >= 0. A direction with `low` = `high` = 0 has no shift.
         along: Directions as unit vectors, shape (K, 3), in world axes for "frame" and platform axes for "platform".
-        cables: Indices of the cables with shifted anchors, from 0; empty for all.
-        symmetry: Relation of the shifts to the shift of the first anchor. "x", "xy" or other axes: shifts are mirrored
-            at the planes normal to these axes. "turned": the shift is rotated about the vertical by the angle between
-            the anchors. "together": all shifts are equal. None: all shifts are independent.
+        cables: Indices of the cables with shifted anchors, from 0; empty for all cables.
+        symmetry: Rule that gives all shifts from the shift of the first anchor. "x", "xy" or other axes: shifts are
+            mirrored at the planes normal to these axes. "turned": shifts are rotated about the vertical, by the angle
+            between the anchors. "together": all shifts are equal. None: all shifts are independent.
     """
 
     end: str
@@ -125,15 +125,15 @@ class FreeAnchors(free.Free):
 
         Args:
             end: "frame" or "platform".
-            low: Lowest shifts [m]: three numbers along x, y, z; with `along` one number per direction.
+            low: Smallest shifts [m]: three numbers for x, y, z, or one number per direction in `along`.
             high: Largest shifts [m], with the shape of `low`.
-            along: One or several directions, vectors of any nonzero length; None for x, y and z.
-            cables: Indices of the cables with shifted anchors, from 0; None for all.
+            along: Directions of the shifts, one or several vectors of any nonzero length; None for x, y and z.
+            cables: Indices of the cables with shifted anchors, from 0; None for all cables.
             symmetry: "x", "y", "z", "xy", ..., "turned", "together", or None.
 
         Raises:
-            InvalidValueError: If low is above high, if 0 (the position in the robot) is not between them, if all
-                coordinates are fixed, or if an argument is of the wrong kind.
+            InvalidValueError: If a shift of 0, the initial position, is not between `low` and `high`; if all shifts are
+                fixed; if an argument has a wrong type.
 
         Examples:
             >>> import sagline as sl
@@ -168,7 +168,7 @@ class FreeAnchors(free.Free):
         rates: list[Array] = []
         names = _direction_names(self.along)
         shifts = _symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
-        for which, moved in shifts:  # moved (K, c, 3): shifts of each cable's anchor for each direction
+        for which, moved in shifts:  # moved (K, c, 3): shift of each anchor per direction
             for k, name in enumerate(names):
                 rate = np.zeros((robot.cable_count, tables.CABLE_COLUMNS))
                 rate[cables, ENDS[self.end] : ENDS[self.end] + 3] = moved[k]
@@ -183,7 +183,7 @@ class FreeAnchors(free.Free):
             raise InvalidValueError(f"{item}: symmetry", "fixes all anchors", "a symmetry that permits a shift", step)
 
         def write(tables_of_cables: Array, values: Array) -> None:
-            for k, rate in enumerate(rates):  # einsum sums in an order that does not depend on the number of candidates
+            for k, rate in enumerate(rates):  # this order of summation does not depend on N
                 tables_of_cables += values[:, k, None, None] * rate
 
         return tuple(parts), write
@@ -208,7 +208,7 @@ def _shifts(value: ArrayLike, item: str, count: int) -> Array:
 
 
 def _direction_names(along: Array) -> list[str]:
-    """Name of a direction: x, y or z, or its components."""
+    """Name of each direction: x, y or z, or a text with the components of the vector."""
     names = []
     for vector in along:
         axis = np.flatnonzero(np.abs(vector) > 1.0 - _UNIT)

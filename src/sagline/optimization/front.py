@@ -1,4 +1,4 @@
-"""Result of a design search, and the record of its rated candidates."""
+"""Result of a design search, and rating of candidates for an optimizer."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class Front(Result):
 
     Attributes:
         start: Initial robot of the search.
-        robots: The K better robots, sorted by the first goal; the best robot is the first. Optimizers other than
-            "nsga2" give one robot, with the best weighted sum. If no robot is better, it is the initial robot.
+        robots: K better robots, the best in the first goal first. Optimizers other than "nsga2" give one robot, which
+            has the best weighted sum. If no robot is better, the only robot is the initial robot.
         goals: The g goals.
-        values: Goal values of the robots, each in its unit, shape (K, g).
+        values: Goal values of the K robots, in the units of the goals, shape (K, g).
         start_values: Goal values of the initial robot, shape (g,).
         parts: The d design variables.
-        changed: Design variables of the K robots, shape (K, d).
+        changed: Values of the design variables of the K robots, shape (K, d).
         better: True if a robot is better than the initial robot.
-        evaluated: Design variables of all candidates in the order of evaluation, the initial robot first, shape (N, d).
+        evaluated: Design variables of all N candidates in the order of evaluation, initial robot first, shape (N, d).
         evaluated_values: Goal values of all candidates, shape (N, g); NaN for a dropped candidate.
         optimizer: Name of the optimizer.
         seed: Seed of the search.
@@ -61,12 +61,12 @@ class Front(Result):
 
     @property
     def best(self) -> Robot:
-        """The best robot in the first goal."""
+        """Robot with the best value of the first goal."""
         return self.robots[0]
 
     @property
     def text(self) -> str:
-        """Summary in one sentence."""
+        """Sentence with the goal values of the best robot."""
         count, name = len(self.evaluated), self.start.name
         if not self.better:
             return f"None of {count:,} robots is better than {name}: widen the bounds, or allow more evaluations."
@@ -79,13 +79,13 @@ class Front(Result):
         return f"{len(self.robots)} of {count:,} robots are better than {name} in a goal; the first: {goals}."
 
     def save(self, folder: Path | str) -> list[Path]:
-        """Write each robot as a robot file, and a table of all robots.
+        """Write a robot file for each robot, and a table of all robots.
 
         Args:
             folder: The folder; it is created if its parent folder exists. Files with the same names are replaced.
 
         Returns:
-            The files: front.csv, and for each robot a .yaml file with the robot's name.
+            Paths of the files: front.csv, and for each robot a .yaml file with the robot's name.
 
         Raises:
             FileError: If a file cannot be written.
@@ -105,36 +105,36 @@ class Front(Result):
         return [place / name for name in names]
 
     def __str__(self) -> str:
-        """Summary in one sentence."""
+        """Sentence with the goal values of the best robot."""
         return self.text
 
 
 def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
-    """Scaled costs (N, g) to be minimized, from goal values (N, g); at most PENALTY, or twice PENALTY for NaN."""
+    """Costs (N, g) that an optimizer minimizes, from goal values (N, g); at most PENALTY, or 2 PENALTY for NaN."""
     signs = np.array([-1.0 if goal.maximize else 1.0 for goal in goals])
     scales = np.array([_scale_of(goal, value) for goal, value in zip(goals, start, strict=True)])
     costs = np.nan_to_num(signs * values / scales, nan=2.0 * PENALTY, posinf=PENALTY, neginf=-PENALTY)
     return np.asarray(np.where(np.isnan(values), PENALTY * 2.0, np.clip(costs, -PENALTY, PENALTY)))
 
 
-PENALTY = 1e9  # largest cost of a goal; it is much larger than usual costs
+PENALTY = 1e9  # largest cost of a goal, much larger than usual costs
 
 
 def _scale_of(goal: Goal, start: float) -> float:
-    """Scale of a goal in its unit: the given scale, or the goal's value for the initial robot."""
+    """Scale by which a goal is divided: `goal.scale` or, if this is None, the initial robot's value `start`."""
     if goal.scale is not None:
         return goal.scale
     return abs(float(start)) if np.isfinite(start) and start != 0.0 else 1.0
 
 
 def _weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
-    """Weighted sums (N,) of costs (N, g)."""
+    """Sums (N,) of the costs (N, g), multiplied by the weights of the goals."""
     weights = np.array([goal.weight for goal in goals])
     return np.asarray(np.einsum("ng,g->n", costs, weights / weights.sum()))
 
 
 def pareto_front(costs: Array) -> Indices:
-    """Indices of the Pareto-optimal candidates, from costs (N, g); of equal candidates, only the first one."""
+    """Indices of the Pareto-optimal candidates with `costs` (N, g); only the first of several equal candidates."""
     _, first = np.unique(costs, axis=0, return_index=True)
     kept = np.sort(first)
     own = costs[kept]
@@ -142,14 +142,14 @@ def pareto_front(costs: Array) -> Indices:
     return np.asarray(kept[~beaten])
 
 
-LONGEST: Final = 80  # largest number of letters of a robot's name before the number
+LONGEST: Final = 80  # largest number of letters in a robot's name before its number
 
 
 class Ledger:
     """Rating of candidates for an optimizer.
 
-    With the same seed, an optimizer requests the same candidates again. Recorded candidates are not rated again.
-    Therefore, a continued search has the same result as a search without interruption.
+    With the same seed, an optimizer requests the same candidates again. Candidates in the record are not rated again. A
+    continued search therefore gives the same result as a search without interruption.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class Ledger:
         evaluations: int,
         progress: Progress | None,
     ) -> None:
-        """Prepare the rating, and reject goals that are not finite for the initial robot."""
+        """Prepare the rating, and reject goals that have no finite value for the initial robot."""
         self._request, self._candidates = request, candidates
         self.record: DesignFolder | None = None
         self._evaluations, self._progress = evaluations, progress
@@ -176,11 +176,11 @@ class Ledger:
 
     @property
     def costs(self) -> int:
-        """Number of costs per candidate: the number of goals for a front, otherwise 1."""
+        """Number of costs per candidate: the number of goals for a Pareto front, otherwise 1."""
         return len(self._request.goals) if self._request.optimizer == "nsga2" else 1
 
     def rate(self, points: Array) -> Array:
-        """Costs (N, costs) of points of the unit cube (N, d)."""
+        """Costs (N, costs) of the candidates at the points (N, d) of the unit cube."""
         values = self._candidates.values(points)
         values[(points == self._start).all(axis=1)] = self._candidates.start
         known = self._recalled(values)
@@ -197,7 +197,7 @@ class Ledger:
         return costs if self.costs > 1 else _weighted_costs(costs, self._request.goals)[:, None]
 
     def front(self) -> Front:
-        """Result of the search, with the best candidates as robots."""
+        """Result of the search with the best candidates."""
         request, costs = self._request, self._costs(self._rows)
         goals = self._rows[:, self._width :]
         if request.optimizer == "nsga2":
@@ -233,7 +233,7 @@ class Ledger:
         return costs_of(rows[:, self._width :], self._request.goals, self._first)
 
     def _recalled(self, values: Array) -> Array:
-        """Recorded rows of the candidates, up to the first candidate without a record."""
+        """Rows of the record for the candidates `values`, up to the first candidate that is not in the record."""
         if self.record is None:
             return np.zeros((0, self._rows.shape[1]))
         first = len(self._rows)
@@ -247,7 +247,7 @@ class Ledger:
         return known
 
     def _check_first(self) -> None:
-        """Reject goals that are not finite for the initial robot."""
+        """Reject goals that have no finite value for the initial robot."""
         for goal, value in zip(self._request.goals, self._first, strict=True):
             if np.isinf(value):
                 item = f"{goal.kind} of {self._request.robot.name}"

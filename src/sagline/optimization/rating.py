@@ -1,4 +1,4 @@
-"""Ratings of candidates: values of the goals from cable tables, and anchors that move to the largest margin."""
+"""Rating of candidates by the values of goals, and anchors that move to positions with the largest margin."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from sagline.optimization.search import latin_hypercube
 from sagline.robot.batch import has_routing
 from sagline.robot.pose import Pose, PoseBox, PoseLike
 from sagline.robot.robot import Robot
-from sagline.statics.stiffness import compliance_of
+from sagline.statics.stiffness import least_stiffness
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import MinimumNorm
@@ -38,16 +38,16 @@ from sagline.workspaces.levels import middle_wrench
 from sagline.workspaces.margin import MarginRows, mean_arms
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
-BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
+BLOCK = 1 << 12  # number of poses per block, which takes about 0.1 s; Ctrl-C is handled between blocks
 
 
 def distribute(
     robot: Robot, model: CableModel, cables: Array, poses: Array, wrench: Array, *, stiffness: bool
 ) -> tuple[Array, Array, Array | None]:
-    """Largest tension [N], largest sag [m] and, if requested, least stiffness [N/m], each (N,), with `MinimumNorm`.
+    """Largest tension [N], largest sag [m] and least stiffness [N/m] of N poses, each (N,), with `MinimumNorm`.
 
-    Values are NaN if there are no tensions. Each of the N pose rows has a table (m, CABLE_COLUMNS) of its own. The
-    stiffness is the smallest stiffness against a force on the center of mass.
+    A value is NaN at a pose without feasible tensions. cables: one table (m, CABLE_COLUMNS) per pose. The stiffness,
+    which is computed only if requested, is the smallest stiffness against a force on the center of mass.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
@@ -72,7 +72,7 @@ def distribute(
 
 
 def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Array:
-    """Sag of each cable [m], (N, m)."""
+    """Sag (N, m) of each cable [m], from the rows `results` of the kernels."""
     length = results[tables.LENGTH]
     if len(results) > tables.BARE_ROWS:
         length = length - (results[tables.WRAPPED] + results[tables.DEAD])
@@ -89,7 +89,7 @@ def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Ar
 def _stiffness(
     robot: Robot, model: CableModel, results: Array, given: tuple[Array, Array, Array], behind: bool
 ) -> Array:
-    """Ratio of force to displacement of the center of mass in the softest direction [N/m], (N,)."""
+    """Least stiffness (N,): ratio of force to displacement of the center of mass in the softest direction [N/m]."""
     cables, poses, load = given
     count, m = cables.shape[:2]
     matrices, levers = np.empty((count, 6, 6)), np.empty((count, m, 3))
@@ -98,25 +98,21 @@ def _stiffness(
     lengths = locked(np.ascontiguousarray(results[tables.LENGTH]))
     terms = (robot.freedom, body_table(robot), cables, lengths, poses, load)
     describe_states(code, terms, memory_for(m), matrices, blocks_of, slopes, levers)
-    compliance = compliance_of(robot.freedom, matrices)[:, :3, :3]
-    known = np.asarray(np.isfinite(compliance).all(axis=(-1, -2)))
-    symmetric = np.where(known[:, None, None], 0.5 * (compliance + np.swapaxes(compliance, -1, -2)), 0.0)
-    softest = np.abs(np.linalg.eigvalsh(symmetric)).max(axis=-1)
-    return np.asarray(np.where(known & (softest > 0.0), 1.0 / np.where(softest > 0.0, softest, 1.0), np.nan))
+    return least_stiffness(robot.freedom, matrices)
 
 
-Margins: TypeAlias = Callable[[Array, Array], Array]  # function that computes margins from cable tables and pose rows
+Margins: TypeAlias = Callable[[Array, Array], Array]  # (cable tables, pose rows) -> margins
 
-SPREAD: Final = 4  # number of sample points per coordinate
-STEP: Final = 0.25  # initial step, relative to the distance between the bounds
+SPREAD: Final = 4  # number of sample points per moving coordinate
+STEP: Final = 0.25  # initial step of the search, relative to the distance between the bounds
 ITERATIONS: Final = 14  # number of halvings of the step
 
 
-def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
-    """Best anchor coordinates (R, q) for R pairs of a cable table and a pose row, and their margins (R,) [N].
+def _move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
+    """Anchor coordinates (R, q) with the largest margin for R pairs of cable table and pose row; margins (R,) [N].
 
-    A search along the coordinates, with steps that are halved, begins at the best point of a sample. The result is a
-    local maximum.
+    The search for a local maximum begins at the best point of a sample, moves along one coordinate after another, and
+    halves the steps.
     """
     count, q = len(poses), len(inner.parts)
 
@@ -148,11 +144,11 @@ def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Arra
     return inner.values(best), found
 
 
-ROWS: Final = 1 << 14  # pose rows per block; a block takes about 0.1 s and little memory
+ROWS: Final = 1 << 14  # number of pose rows per block, which takes about 0.1 s
 
 
 class Rating:
-    """Function that rates candidates; it is prepared once per search."""
+    """Callable object that rates candidates, prepared once per search."""
 
     def __init__(
         self,
@@ -164,12 +160,12 @@ class Rating:
         robust: AnchorErrors | None,
         inner: Candidates | None,
     ) -> None:
-        """Prepare the rating; raises an error if a goal needs tensions that the initial robot has at no pose."""
+        """Prepare the rating. Raises an error if a goal needs tensions but the initial robot is feasible at no pose."""
         self._candidates, self._goals, self._robust, self._inner = candidates, tuple(goals), robust, inner
         self._model, self._poses, self.rows = model, poses, pose_rows(poses)
         self._wrench = np.zeros(6) if wrenches is None else middle_wrench(wrenches)
         self._wrenches = NO_LOAD if wrenches is None else wrenches
-        # all candidates have the lever arm of the initial robot, so that their margins are comparable
+        # All candidates are rated with the lever arm of the initial robot, so that margins are comparable.
         self._arm = float(mean_arms(cable_table(candidates.robot), body_table(candidates.robot))[0])
         self._needs = {goal.needs for goal in self._goals}
         self._solid = PlatformBox(candidates.robot, poses)
@@ -178,20 +174,20 @@ class Rating:
             self._held = self._held_at(candidates.cables(candidates.start[None]))
 
     def __call__(self, values: Array) -> Array:
-        """Values (N, g) of the goals for design variables (N, d).
+        """Goal values (N, g) of candidates with the design variables `values` (N, d).
 
-        Values are NaN for an impossible candidate: it has coincident cables, a lower limit above an upper limit, or a
-        frame anchor inside the platform. Values are also NaN if a goal needs tensions, and a pose is infeasible for the
-        candidate but feasible for the initial robot.
+        Goal values are NaN for a candidate with coincident cables, with a lower tension limit above an upper limit, or
+        with a frame anchor inside the platform. If a goal needs tensions, goal values are also NaN for a candidate that
+        is infeasible at a pose at which the initial robot is feasible.
         """
         size = max(1, ROWS // (len(self.rows) * (1 if self._robust is None else self._robust.samples)))
         parts = [self._rated(values[first : first + size]) for first in range(0, len(values), size)]
         return np.concatenate(parts)
 
     def margins(self, cables: Array, rows: Array) -> Array:
-        """Margins (N,) [N] of tables (R, m, CABLE_COLUMNS) at pose rows (N, POSE_COLUMNS), N/R rows per table.
+        """Margins (N,) [N] of R cable tables (R, m, CABLE_COLUMNS) at pose rows (N, POSE_COLUMNS), N/R rows per table.
 
-        The margin is -inf at a pose with a frame anchor inside the platform.
+        The margin is -inf at a pose at which a frame anchor is inside the platform.
         """
         made = MarginRows(self._candidates.robot, self._wrenches, self._model, self._arm, cables)
         anchors = np.repeat(cables[..., : tables.FRAME_Z + 1], len(rows) // len(cables), axis=0)
@@ -213,7 +209,7 @@ class Rating:
         return found
 
     def _measured(self, cables: Array, values: Array) -> Measured:
-        """Quantities that the goals need, for the possible candidates."""
+        """Quantities of candidates that the goals need, such as margins and tensions."""
         many = cables[:, None] if self._robust is None else self._robust.added(cables)
         shape = (*many.shape[:2], len(self.rows))
         robots = many.reshape(-1, *many.shape[2:])
@@ -221,7 +217,7 @@ class Rating:
         margin, each = np.zeros(shape), robots
         if self._inner is not None:
             each = np.repeat(robots, len(self.rows), axis=0)
-            shifts, margin = move_anchors(self._inner, self.margins, each, rows)
+            shifts, margin = _move_anchors(self._inner, self.margins, each, rows)
             self._inner.write(each, shifts)
         elif "margin" in self._needs:
             margin = self.margins(robots, rows)
@@ -241,7 +237,7 @@ class Rating:
         return measured | {name: one.reshape(*shape[:2], -1) for name, one in at_poses if one is not None}
 
     def _cost(self, cables: Array, values: Array) -> Array:
-        """Cost (N, S) of cables, each as long as its longest chord, from tables (N, S, G, m, CABLE_COLUMNS)."""
+        """Cost (N, S) of the cables in tables (N, S, G, m, CABLE_COLUMNS), each as long as its longest chord."""
         costs = self._candidates.costs(values)
         if costs is None:
             step = "Add the design variable FreeCable([CableChoice(name, cable, cost=1.5), ...])."
@@ -251,7 +247,7 @@ class Rating:
         return np.asarray(costs[:, None] * chords.max(axis=2).sum(axis=-1))
 
     def _held_at(self, cables: Array) -> Flags:
-        """Mask of poses at which a robot has tensions, shape (G,)."""
+        """True for each pose at which a robot has feasible tensions, shape (G,)."""
         each = np.repeat(cables, len(self.rows), axis=0)
         found = distribute(self._candidates.robot, self._model, each, self.rows, self._wrench, stiffness=False)
         held = ~np.isnan(found[0])
@@ -266,16 +262,16 @@ _CATENARY: Final = Catenary()
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MovingAnchors(Result, Tabular):
-    """Result of `moving_anchors` at G poses.
+    """Result of `moving_anchors`: anchor positions with the largest margin at each of G poses.
 
     Attributes:
-        robot: The robot, with the anchors at their original positions.
+        robot: The robot with the anchors at their original positions.
         pose: The poses, a batch of G.
         parts: The q moving coordinates.
         moved: Values of the moving coordinates at each pose, shape (G, q).
         margin: Margin with moved anchors [N], shape (G,).
         fixed_margin: Margin with the anchors at their original positions [N], shape (G,).
-        moving: The given moving anchors.
+        moving: The argument `moving` of `moving_anchors`.
     """
 
     _columns: ClassVar[Columns] = ("pose", "margin", "fixed_margin")
@@ -289,13 +285,13 @@ class MovingAnchors(Result, Tabular):
     moving: tuple[Free, ...]
 
     def __str__(self) -> str:
-        """Sentence with the mean increase of the margin."""
+        """Sentence with the mean increase of the margin by moving anchors."""
         gain = n(np.mean(self.margin - self.fixed_margin), unit="N") if len(self.moved) else "–"
         return f"{self.robot.name}, {counted(len(self.moved), 'pose')}: the margin is {gain} larger on average"
 
     @property
     def robots(self) -> tuple[Robot, ...]:
-        """Robots with moved anchors, one per pose, for functions such as `inverse`."""
+        """One robot per pose, with the anchors at the best positions, as an argument of functions such as `inverse`."""
         names = [self.robot.name] * len(self.moved)
         return Candidates(self.robot, self.moving, "moving").robots(self.moved, names)
 
@@ -313,20 +309,20 @@ def moving_anchors(
 ) -> MovingAnchors:
     """Move anchors of a robot to the positions with the largest margin at each pose.
 
-    The best positions of a sample are the start; then steps along one coordinate after another improve them.
+    The search begins at the best positions of a sample, and improves one coordinate after another.
 
     Args:
         robot: The robot.
-        moving: Moving anchors: `FreeAnchors`.
-        wrenches: Set of loads, for example a `WrenchBox`; None for the weight alone.
+        moving: Anchors that move, as `FreeAnchors`.
+        wrenches: Set of wrenches, for example a `WrenchBox`; None for the platform's weight alone.
         poses: Poses; None for a grid of level poses in a box.
         box: Box of the grid; None for the robot's test box, level.
         grid: Number of poses of the grid along x, y and z.
         model: Cable model.
-        progress: Function that is called from time to time with the number of finished poses and of all poses.
+        progress: Function that is called repeatedly with the number of finished poses and the number of all poses.
 
     Returns:
-        MovingAnchors.
+        MovingAnchors with the anchor positions and margins at all poses.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind.
@@ -355,6 +351,6 @@ def moving_anchors(
     moved, margin = np.empty((count, len(inner.parts))), np.empty(count)
     for part in blocks(count, BLOCK // 2, progress):
         own = np.repeat(table, part.stop - part.start, axis=0)
-        moved[part], margin[part] = move_anchors(inner, rating.margins, own, rating.rows[part])
+        moved[part], margin[part] = _move_anchors(inner, rating.margins, own, rating.rows[part])
     fixed = rating.margins(table, rating.rows)
     return MovingAnchors(robot, places, inner.parts, locked(moved), locked(margin), locked(fixed), parts)

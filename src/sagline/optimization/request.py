@@ -1,4 +1,4 @@
-"""Goals of a design search, and its checked request: robot, design variables, goals, loads and poses."""
+"""Goals of a design search, and the checked arguments of a design search."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBo
 from sagline.optimization.free import Free
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.search import SEARCHES
-from sagline.robot.pose import Pose, PoseBox, PoseLike, pose_of
+from sagline.robot.pose import Pose, PoseBox, PoseLike, level_grid, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
@@ -32,7 +32,7 @@ MOST: Final = 100_000  # largest number of poses
 
 
 def poses_of(robot: Robot, poses: PoseLike | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
-    """The given poses as a batch; otherwise, a grid of level poses in a box, by default in the robot's test box."""
+    """Batch of the given poses or, if `poses` is None, a grid of poses without rotation in a box."""
     counts = _counts(grid)
     if poses is not None:
         if box is not None:
@@ -42,7 +42,7 @@ def poses_of(robot: Robot, poses: PoseLike | None, box: PoseBox | None, grid: Se
         if not 0 < len(batch) <= MOST:
             raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give at least one pose.")
     else:
-        batch = _grid(_box(robot, box), counts)
+        batch = level_grid(_box(robot, box), counts)
     check_reach(robot, batch, "poses")
     return batch
 
@@ -69,21 +69,12 @@ def _counts(grid: Any) -> tuple[int, ...]:
     return counts
 
 
-def _grid(box: PoseBox, counts: tuple[int, ...]) -> Pose:
-    axes = [
-        np.linspace(low, high, count) if count > 1 and high > low else np.array([0.5 * (low + high)])
-        for low, high, count in zip(box.low, box.high, counts, strict=True)
-    ]
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return Pose.from_euler(places, 0.0, 0.0, 0.0)
-
-
 MOST_EVALUATIONS: Final = 10_000_000
-_SEED: Final = 2**31 - 1  # largest seed that all optimizers accept
+_SEED: Final = 2**31 - 1  # largest seed that every optimizer accepts
 
 
 def _goals(given: Any, item: str) -> tuple[Goal, ...]:
-    """Checked goals; a name is replaced by the goal with this name."""
+    """Checked tuple of goals; a name of a goal is replaced by a `Goal`."""
     many = [given] if isinstance(given, Goal | str) else given
     if not isinstance(many, Sequence) or not many:
         step = 'Give [Goal("workspace_share")] for instance.'
@@ -98,7 +89,7 @@ def _goals(given: Any, item: str) -> tuple[Goal, ...]:
 
 
 def _check_platform(request: Request) -> None:
-    """Reject an initial robot with a frame anchor inside the platform; the search rejects such candidates later."""
+    """Reject an initial robot that has a frame anchor inside the platform at any pose."""
     anchors = request.robot.frame_anchors
     poses = PlatformBox(request.robot, request.poses).holds(anchors)
     if (poses >= 0).any():
@@ -108,7 +99,7 @@ def _check_platform(request: Request) -> None:
         raise InvalidValueError(item, value, "outside the platform at all poses", step)
 
 
-# Quantities of N candidates at G poses, for S samples of anchor errors (1 without errors), if goals need them:
+# Quantities of N candidates at G poses with S samples of anchor errors (1 without errors):
 # "margin": margin of the wrench set [N], (N, S, G); -inf if a pose is singular or a cable has no length
 # "tension", "sag": largest cable tension [N] and sag [m], (N, S, G); NaN without tensions
 # "stiffness": stiffness in the softest direction [N/m], (N, S, G); NaN without tensions
@@ -117,7 +108,7 @@ Measured: TypeAlias = Mapping[str, Array]
 
 
 def heading(name: str, unit: str) -> str:
-    """Name and unit of a column: "mean_margin [N]"."""
+    """Heading of a column with name and unit, such as "mean_margin [N]"."""
     return f"{name} [{unit}]" if unit else name
 
 
@@ -135,16 +126,16 @@ KINDS: Final[Mapping[str, tuple[str, bool, str, Callable[[Array], Any]]]] = Mapp
         "cable_cost": ("", False, "cost", lambda cost: cost),
     }
 )
-AT_POSES: Final = ("tension", "sag", "stiffness")  # goals that require a tension distribution
+AT_POSES: Final = ("tension", "sag", "stiffness")  # quantities that need a tension distribution
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A quantity to maximize or minimize.
+    """Goal of a design search: a quantity to maximize or minimize.
 
-    Tensions, sag and stiffness are for the platform's weight plus the middle of the wrench set, with the tension
-    distribution `MinimumNorm`. They are evaluated at the feasible poses of the initial robot. A candidate for which one
-    of these poses is infeasible is rejected.
+    Tensions, sag and stiffness are computed for the platform's weight plus the center of the wrench set, with the
+    tension distribution `MinimumNorm`, at all poses at which the initial robot is feasible. A candidate that is
+    infeasible at one of these poses is dropped.
 
     Attributes:
         kind: "workspace_share" (share of the poses with a nonnegative margin), "mean_margin" or "least_margin"
@@ -152,7 +143,8 @@ class Goal:
             "cable_cost" (catalogue cost of cables, each as long as its longest chord).
         maximize: True to maximize, False to minimize.
         weight: Weight relative to other goals, > 0.
-        scale: Value by which the goal is divided, in its unit; None: the initial robot's value, or 1 if it is 0.
+        scale: Value by which the goal is divided, in the unit of the goal; None for the initial robot's value, or 1 if
+            this value is 0.
     """
 
     kind: str
@@ -192,19 +184,19 @@ class Goal:
 
     @property
     def unit(self) -> str:
-        """Unit of the goal's values."""
+        """Unit of the values of the goal."""
         return KINDS[self.kind][0]
 
     @property
     def needs(self) -> str:
-        """Quantity of the candidates from which the goal is computed."""
+        """Name of the quantity in `Measured` from which the goal is computed."""
         return KINDS[self.kind][2]
 
     def values(self, measured: Measured, *, worst: bool) -> Array:
         """Value of the goal of each candidate.
 
         Args:
-            measured: Quantities of the candidates.
+            measured: Quantities of the candidates, by name.
             worst: True for the worst value of the samples of anchor errors, False for the mean value.
 
         Returns:
@@ -217,22 +209,22 @@ class Goal:
 
 
 def _given(value: Any) -> Any:
-    """Return a value unchanged. This converter gives type checkers the type of the argument."""
+    """Converter that returns a value unchanged, and gives type checkers the type of the constructor's argument."""
     return value
 
 
 @frozen(eq=False, weakref_slot=False)
 class Request:
-    """A design search, without its number of evaluations. The constructor checks the arguments of `design`.
+    """Checked arguments of `design`, without the number of evaluations.
 
     Attributes:
         robot: Initial robot of the search.
         free: Design variables.
         goals: Goals.
-        wrenches: Set of loads; None for the weight alone.
-        poses: Poses, a batch.
+        wrenches: Set of wrenches; None for the platform's weight alone.
+        poses: Batch of poses.
         model: Cable model.
-        inner: Anchors that the machine moves from pose to pose.
+        inner: Anchors that the machine moves during operation.
         robust: Errors of the anchors, or None.
         optimizer: Name of the optimizer.
         seed: Seed of all random numbers.
@@ -250,7 +242,7 @@ class Request:
     seed: int = field(metadata=checked_by(whole_number, 0, _SEED))
 
     def __attrs_post_init__(self) -> None:
-        """Check the arguments, one by one and then together."""
+        """Check each argument, then combinations of arguments."""
         check_fields(self)
         if not self.free:
             step = "Give design variables; for moving anchors alone, call moving_anchors."
@@ -272,5 +264,5 @@ class Request:
 
     @property
     def candidates(self) -> Candidates:
-        """The candidates of the search."""
+        """Candidates of the search, prepared for the initial robot."""
         return Candidates(self.robot, self.free)

@@ -14,7 +14,7 @@ from sagline.core.errors import InvalidValueError
 
 
 def _optional_module(module: str) -> Any:
-    """Import a module of a package of `sagline[design]`; the error contains the command that installs the package."""
+    """Import a module of an optional package; the error of a missing package states the command that installs it."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
@@ -26,20 +26,20 @@ def _optional_module(module: str) -> Any:
 
 
 Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) -> costs (N, g)
-# The arguments of a search are: function that rates a generation; points of the first generation (K, d), which begins
-# with the initial robot; largest number of rated points, including the first generation; seed; number of costs g.
+# Arguments of a search: function that rates the points of a generation; first generation (K, d), which begins with the
+# initial robot; largest number of rated points, including the first generation; seed; number of costs g.
 
 
 def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
-    """Latin hypercube sample (count, dimensions) of the unit cube (McKay, Beckman & Conover 1979)."""
+    """Random points (count, dimensions) in the unit cube by Latin hypercube sampling (McKay et al. 1979)."""
     random = np.random.default_rng(seed)
     intervals = np.stack([random.permutation(count) for _ in range(dimensions)], axis=-1)
     return np.asarray((intervals + random.random((count, dimensions))) / count)
 
 
-SPREAD: Final = 0.2  # first standard deviation, relative to the distance between the bounds
-GROWTH: Final = 2  # factor by which the population grows at each restart
-LEAST_DIMENSIONS: Final = 2  # the package fails with one variable, so a second variable without effect is added
+SPREAD: Final = 0.2  # initial standard deviation of CMA-ES in the unit cube
+GROWTH: Final = 2  # factor by which the population of CMA-ES grows at each restart
+LEAST_DIMENSIONS: Final = 2  # the package needs two variables; a single variable gets a second one without effect
 
 
 def _search_cma(rate: Rate, first: Array, evaluations: int, seed: int, _: int) -> None:
@@ -62,12 +62,12 @@ def _search_cma(rate: Rate, first: Array, evaluations: int, seed: int, _: int) -
 
 
 def _strategy(cma: Any, start: Array, random: np.random.Generator, population: int | None) -> Any:
-    """One run of CMA-ES with its own random numbers; numpy's global generator does not change."""
+    """CMA-ES for one run, with its own generator of random numbers in place of numpy's global generator."""
     padded = np.concatenate((start, np.full(max(LEAST_DIMENSIONS - len(start), 0), 0.5)))
     options = {
         "bounds": [0.0, 1.0],
         "randn": lambda *shape: random.standard_normal(shape),
-        "seed": np.nan,  # no seed is given, because `randn` has one
+        "seed": np.nan,  # the generator `randn` already has a seed
         "verbose": -9,
         **({} if population is None else {"popsize": population}),
     }
@@ -78,14 +78,14 @@ def _search_differential_evolution(rate: Rate, first: Array, evaluations: int, s
     """Differential evolution (Storn & Price 1997)."""
     from scipy.optimize import differential_evolution
 
-    def costs(points: Array) -> Array:  # scipy passes points as columns
+    def costs(points: Array) -> Array:  # scipy passes each point as a column
         return rate(np.ascontiguousarray(points.T))[:, 0]
 
     differential_evolution(
         costs,
         [(0.0, 1.0)] * first.shape[1],
         init=first,
-        maxiter=evaluations // len(first) - 1,  # number of generations after the first
+        maxiter=evaluations // len(first) - 1,  # number of generations after the first generation
         vectorized=True,
         updating="deferred",
         polish=False,
@@ -105,7 +105,7 @@ def _search_nsga2(rate: Rate, first: Array, evaluations: int, seed: int, goals: 
     algorithm.setup(problem, termination=termination.NoTermination(), seed=seed)
     while True:
         asked = algorithm.ask()
-        if asked is None or not 0 < len(asked) <= evaluations:  # None if the optimizer finds only known points
+        if asked is None or not 0 < len(asked) <= evaluations:  # None: the optimizer found only known points
             return
         costs = rate(asked.get("X"))
         evaluator.Evaluator().eval(static.StaticProblem(problem, F=costs), asked)
@@ -116,10 +116,3 @@ def _search_nsga2(rate: Rate, first: Array, evaluations: int, seed: int, goals: 
 SEARCHES: Final[MappingProxyType[str, Callable[[Rate, Array, int, int, int], None]]] = MappingProxyType(
     {"cma": _search_cma, "differential_evolution": _search_differential_evolution, "nsga2": _search_nsga2}
 )
-
-
-def population_of(optimizer: str, dimensions: int) -> int:
-    """Number of candidates of the first generation, including the initial robot."""
-    if optimizer == "cma":
-        return 2 * (4 + int(3.0 * np.log(dimensions)))
-    return max(16, 4 * dimensions) if optimizer == "differential_evolution" else max(24, 4 * dimensions)

@@ -10,22 +10,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import (
-    HEARTBEAT,
-    OWNER_TIMEOUT,
-    PERIOD,
-    Command,
-    Missing,
-    Refusal,
-    Sample,
-    Sent,
-    newer,
-    no_news,
-    sent_to,
-)
+from sagline.control import link
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
-from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, claim_block, command_blocks, sample_of
+from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, command_blocks, sample_of
 from sagline.plc.wire import Address, LinkError, Wire, WireError, groups_at
 from sagline.robot.robot import Robot
 
@@ -33,25 +21,25 @@ RETRY: Final = 0.2  # time between attempts to connect [s]
 
 
 class _Newest(NamedTuple):
-    """Newest valid block of a group."""
+    """Newest valid block of a group, with its times."""
 
     values: dict[str, Any]  # values of the rows, by name
     arrived: float  # time of arrival on the link's clock [s]
-    round_trip: float  # time from the request or the command to the arrival [s]
+    round_trip: float  # time between the request (or command) and the arrival [s]
 
 
-class GroupThread(Thread):
+class _GroupThread(Thread):
     """Thread that exchanges data with one PLC."""
 
     def __init__(self, number: int, winches: int, wire: Wire, clock: Callable[[], float]) -> None:
-        """Prepare the thread; `clock`: clock of the link [s]."""
+        """Prepare the thread. `clock`: clock of the link [s]."""
         super().__init__(name=f"sagline group {number}", daemon=True)
         self.number = number  # index of the group, from 0
-        self.newest: _Newest | None = None  # newest valid block of the group; None before the first
+        self.newest: _Newest | None = None  # newest valid block of the group; None before the first valid block
         self.discarded = 0
-        self.reason: Refusal | None = None  # reason of the last invalid block; None before the first
-        self.trouble: Refusal | None = None  # last error of the connection; None without an error
-        self.settled = Event()  # event that is set after the first answer of the PLC, valid or not
+        self.reason: link.Refusal | None = None  # reason of the last invalid block; None before the first invalid block
+        self.trouble: link.Refusal | None = None  # last error of the connection; None without an error
+        self.settled = Event()  # event that the first answer of the PLC sets, whether the answer is valid or not
         self._winches = winches
         self._wire = wire
         self._clock = clock
@@ -61,7 +49,7 @@ class GroupThread(Thread):
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
-        """Queue `block` for writing, and read the PLC's block afterwards. It replaces a block in the queue."""
+        """Queue `block` for writing in place of an earlier queued block. After the writing, the PLC's block is read."""
         self._outgoing.append((block, data, self._clock()))
         self._kick.set()
 
@@ -79,14 +67,15 @@ class GroupThread(Thread):
         """Stop the thread immediately."""
         self._wire.abort()
 
-    def silence(self, waited: float) -> Refusal:
+    def silence(self, waited: float) -> link.Refusal:
         """Reason why a PLC has not answered for the time `waited` [s], and the next step."""
         if self._wire.reached():
-            return Refusal(f"the port is open, but there was no response for {waited:g} s", "Check the port")
-        return Refusal(f"no response for {waited:g} s", "Check address and cables, and that the PLC or the twin runs")
+            return link.Refusal(f"the port is open, but there was no response for {waited:g} s", "Check the port")
+        step = "Check address and cables, and that the PLC or the twin runs"
+        return link.Refusal(f"no response for {waited:g} s", step)
 
     def run(self) -> None:
-        """Exchange blocks until the end; reconnect after each failure."""
+        """Exchange blocks until the thread is stopped. Reconnect after each failure."""
         while not self._ending.is_set():
             try:
                 self._wire.open()
@@ -104,7 +93,7 @@ class GroupThread(Thread):
             asked = self._clock()
             if self._outgoing:
                 block, data, since = self._outgoing.popleft()
-                if asked - since < HEARTBEAT:  # after a new connection, older commands are obsolete
+                if asked - since < link.HEARTBEAT:  # after a new connection, commands from before it are obsolete
                     asked = since
                     self._wire.write(block, data)
             if self._ending.is_set():
@@ -116,8 +105,8 @@ class GroupThread(Thread):
     def _take(self, data: bytes, asked: float, connected: float) -> None:
         arrived = self._clock()
         values = FROM_PLC.read(data)
-        self.trouble = reason = values if isinstance(values, Refusal) else self._mismatch(values)
-        if not isinstance(values, Refusal):
+        self.trouble = reason = values if isinstance(values, link.Refusal) else self._mismatch(values)
+        if not isinstance(values, link.Refusal):
             reason = reason or self._no_news(values["counter"], arrived, connected)
             if reason is None:
                 self.newest = _Newest(values, arrived, arrived - asked)
@@ -126,43 +115,43 @@ class GroupThread(Thread):
             self.discarded += 1
         self.settled.set()
 
-    def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
-        """Reason why a valid block is from another PLC; None if it is from the expected PLC."""
-        group = values["group"] - 1  # counters of blocks start at 1
+    def _mismatch(self, values: dict[str, Any]) -> link.Refusal | None:
+        """Reason why a valid block cannot be from the expected PLC; None if it can."""
+        group = values["group"] - 1  # counters of blocks start at 1; 0 means no block
         if group != self.number:
             who = f"is group {group}" if group >= 0 else "has no group number"
             step = "Give the addresses in the groups' order, and give each PLC its number"
-            return Refusal(f"the PLC there {who}, not {self.number}", step)
+            return link.Refusal(f"the PLC there {who}, not {self.number}", step)
         if values["winches"] != self._winches:
-            return Refusal(
+            return link.Refusal(
                 f"the PLC there drives {values['winches']} winches, the robot has {self._winches} in this group",
                 "Check the robot file and the address",
             )
         return None
 
-    def _no_news(self, counter: int, arrived: float, connected: float) -> Refusal | None:
-        """Reason to discard a block, or None if it is new. After a long silence, the PLC may have restarted."""
+    def _no_news(self, counter: int, arrived: float, connected: float) -> link.Refusal | None:
+        """Reason to discard a block, or None if it is new. Any block after a long silence is new (restarted PLC)."""
         newest = self.newest
         if newest is None:
             return None
         known = newest.values["counter"]
-        restarted = newest.arrived < connected or arrived - newest.arrived > OWNER_TIMEOUT
-        return None if newer(counter, known) or (restarted and counter != known) else no_news(counter, known)
+        restarted = newest.arrived < connected or arrived - newest.arrived > link.OWNER_TIMEOUT
+        return None if link.newer(counter, known) or (restarted and counter != known) else link.no_news(counter, known)
 
 
-def _unexpected(error: Exception) -> Refusal:
+def _unexpected(error: Exception) -> link.Refusal:
     text = " ".join(str(error).split())[:80]
-    return Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")
+    return link.Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")
 
 
-LONGEST: Final = 3600.0  # largest value of timeout, the wait for the first answers [s]
+LONGEST: Final = 3600.0  # largest allowed `timeout` for the first answers [s]
 
 
 class BlockLink:
     """Link (`sagline.control.link.Link`) with one connection per group; base class of `S7Link` and `ModbusLink`."""
 
     def __init__(self, addresses: Sequence[Address], robot: Robot | int, wires: Sequence[Wire], timeout: float) -> None:
-        """Connect to all groups at the same time; `timeout`: longest wait for the first answers [s]."""
+        """Connect to all groups at the same time. `timeout`: longest wait for the first answers [s]."""
         patience = number(timeout, "timeout", "s", above=0.0)
         if patience > LONGEST:
             raise InvalidValueError(
@@ -172,7 +161,7 @@ class BlockLink:
         self._addresses = tuple(addresses)
         self._began = perf_counter()
         self._exchanges = [
-            GroupThread(i, len(group), wire, self._clock)
+            _GroupThread(i, len(group), wire, self._clock)
             for i, (group, wire) in enumerate(zip(self._groups, wires, strict=True))
         ]
         for group in self._exchanges:
@@ -186,15 +175,15 @@ class BlockLink:
 
     @property
     def period(self) -> float:
-        """Time between two commands, as in the program of the PLCs [s]."""
-        return PERIOD
+        """Time between two commands [s], the same as in the program of the PLCs."""
+        return link.PERIOD
 
     @property
     def round_trip(self) -> Array:
         """Time from the command to the answer in the newest sample of each group [s], (G,); NaN without a sample."""
         return np.array([np.nan if g.newest is None else g.newest.round_trip for g in self._exchanges])
 
-    def exchange(self, command: Command | None) -> Sample | Missing:
+    def exchange(self, command: link.Command | None) -> link.Sample | link.Missing:
         """Pass a command to the threads of the groups and return the newest data, without waiting.
 
         If `command.claims` is True, a group that another controller owns receives the claim instead of the command.
@@ -225,7 +214,7 @@ class BlockLink:
         )
 
     def close(self) -> None:
-        """Write the last command, and disconnect."""
+        """Wait until the last command is written, then disconnect."""
         for group in self._exchanges:
             group.finish()
         for patience in (0.5, 0.2):  # longest time until the last block is written and the threads end [s]
@@ -239,26 +228,26 @@ class BlockLink:
     def _clock(self) -> float:
         return perf_counter() - self._began
 
-    def _send(self, command: Command, owners: Sequence[int]) -> None:
-        claim = claim_block(command.owner)
+    def _send(self, command: link.Command, owners: Sequence[int]) -> None:
+        claim = CLAIM.pack({"owner": command.owner})
         for group, owner, block in zip(self._exchanges, owners, command_blocks(command), strict=True):
-            what = sent_to(owner, command)
-            if what is Sent.NOTHING:
+            what = link.sent_to(owner, command)
+            if what is link.Sent.NOTHING:
                 group.ask()
             else:
-                group.hand_over(*((TO_PLC, block) if what is Sent.COMMAND else (CLAIM, claim)))
+                group.hand_over(*((TO_PLC, block) if what is link.Sent.COMMAND else (CLAIM, claim)))
 
-    def _missing(self, now: float) -> Missing:
+    def _missing(self, now: float) -> link.Missing:
         silent = [i for i, group in enumerate(self._exchanges) if group.newest is None]
         reasons = [self._refusal(i, now) for i in silent]
-        return Missing(now, tuple(silent), tuple(reason.reason for reason in reasons))
+        return link.Missing(now, tuple(silent), tuple(reason.reason for reason in reasons))
 
-    def _refusal(self, index: int, waited: float) -> Refusal:
+    def _refusal(self, index: int, waited: float) -> link.Refusal:
         group = self._exchanges[index]
         return group.trouble or group.silence(waited)
 
     def _wait(self, timeout: float) -> None:
-        """Wait for the first answers; close the link if a group does not answer."""
+        """Wait for the first answers. If a group does not answer, close the link."""
         for group in self._exchanges:
             group.settled.wait(max(0.0, timeout - self._clock()))
         silent = [i for i, group in enumerate(self._exchanges) if group.newest is None]

@@ -13,13 +13,13 @@ import numpy as np
 from sagline.control.link import GROUP_SIZE, OF_WINCHES, REALS, Command, Refusal, Sample, Whole, groups_of
 from sagline.core.arrays import Array
 
-LAYOUT: Final = 1  # version of the blocks; incremented with every change of an offset below
-TYPES: Final = {  # types of SCL as `struct` formats; the PLC uses big-endian order without gaps
+LAYOUT: Final = 1  # version of the blocks; incremented if an offset in the tables below changes
+TYPES: Final = {  # format in `struct` of each SCL type; PLCs use big-endian order without gaps
     "DInt": "i",
     "DWord": "I",
     "LReal": "d",
     "Real": "f",
-    "Time": "i",  # milliseconds per second
+    "Time": "i",  # number of milliseconds per second
     "UDInt": "I",
     "UInt": "H",
 }
@@ -29,8 +29,8 @@ class Field(NamedTuple):
     """One row of a block."""
 
     name: str  # name in packing and SCL
-    # one of `TYPES`, or the rows of a structure. With a structure, the value is an array of structures, one per winch,
-    # with indices from 1.
+    # one of `TYPES`, or the rows of a structure. In the second case, the value is an array with one structure per
+    # winch, with indices from 1.
     type: str | tuple[Field, ...]
     offset: int  # offset from the start of the block, or of the structure [bytes]
     meaning: str
@@ -38,7 +38,7 @@ class Field(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Data block with standard (not optimized) access; the table defines the offset of every byte."""
+    """Data block with standard (not optimized) access. The rows define the offset of every byte."""
 
     number: int  # number of the data block in the PLC
     name: str  # name of the block in SCL
@@ -49,7 +49,7 @@ class Block:
 
     @cached_property
     def rows(self) -> tuple[tuple[str, str, int], ...]:
-        """Name, type and offset of every plain value. `winch_row` composes the names of the values of a winch."""
+        """Name, type and offset of every plain value. The names of the values of a winch come from `winch_row`."""
         rows: list[tuple[str, str, int]] = []
         for name, kind, offset, _ in self.fields:
             if isinstance(kind, str):
@@ -67,7 +67,7 @@ class Block:
 
     @cached_property
     def packer(self) -> struct.Struct:
-        """Format of the block for `struct`, with every row at its offset."""
+        """Packer of the block from `struct`, with every row at its offset."""
         text, at = ">", 0
         for _, kind, offset in self.rows:
             text += "x" * (offset - at) + TYPES[kind]
@@ -80,7 +80,7 @@ class Block:
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
-        """Unpack the values of the rows, by name. If the bytes are not this block, return the reason."""
+        """Unpack the values of the rows, by name. If the bytes are not this block, the result is the reason."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
@@ -102,7 +102,7 @@ def winch_row(index: int, name: str) -> str:
 
 
 def _bytes(kind: str | tuple[Field, ...]) -> int:
-    assert isinstance(kind, str)  # a structure contains no other structure
+    assert isinstance(kind, str)  # a structure never contains another structure
     return struct.calcsize(f">{TYPES[kind]}")
 
 
@@ -189,11 +189,6 @@ CLAIM: Final = Block(
 BLOCKS: Final = (FROM_PLC, TO_PLC, CLAIM)
 
 
-def claim_block(owner: int) -> bytes:
-    """Create the block with which a controller claims the ownership of a group."""
-    return CLAIM.pack({"owner": owner})
-
-
 def command_blocks(command: Command) -> list[bytes]:
     """Create the blocks of a command, one per group. If the last group has fewer winches, its last values are zero."""
     head = {
@@ -219,7 +214,7 @@ def sample_of(
     discarded: Whole,
     reasons: tuple[Refusal | None, ...] = (),
 ) -> Sample:
-    """Create a sample from valid blocks of all groups; `time` [s]; `age` [s], `discarded` and `reasons`: (G,)."""
+    """Create a sample at `time` [s] from valid blocks of all groups. `age` [s], `discarded`, `reasons`: (G,)."""
     heads = ("counter", "owner", "echo", "status", "fault")
     columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
     for name in OF_WINCHES:

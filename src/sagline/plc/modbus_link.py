@@ -52,23 +52,23 @@ class ModbusLink(BlockLink):
                 or one text with commas between them.
             robot: The robot, or its number of winches.
             device: Modbus device id, the same for each address.
-            timeout: Longest time to the first answers [s].
+            timeout: Longest wait for the first answers [s].
 
         Raises:
-            InvalidValueError: If the number of addresses is not the number of groups, or two addresses are equal.
+            InvalidValueError: If the number of addresses is not the number of groups. If two addresses are equal.
             LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If pymodbus is not installed.
         """
         unit = whole_number(device, "device", 0, MOST_DEVICE)
         places = addresses_of(addresses, PORT)
-        super().__init__(places, robot, [ModbusWire(*place, unit) for place in places], timeout)
+        super().__init__(places, robot, [_ModbusWire(*place, unit) for place in places], timeout)
 
 
-class ModbusWire:
-    """Connection to one PLC. A holding register contains two bytes of a block; the bytes are the same as over S7."""
+class _ModbusWire:
+    """Connection to one PLC. Each holding register contains two bytes of a block, the same bytes as over S7."""
 
     def __init__(self, host: str, port: int, device: int) -> None:
-        """Store the address; `open` connects."""
+        """Store the address. The method `open` connects."""
         with plc_packages():
             from pymodbus.client import ModbusTcpClient
         self._client = ModbusTcpClient(host, port=port, timeout=ANSWER, retries=0)
@@ -82,7 +82,7 @@ class ModbusWire:
         except Exception as error:
             raise WireError(refusal_of(error, "Modbus")) from error
         if not connected:
-            try:  # the library does not report the reason
+            try:  # the library does not report the reason of the failure
                 socket.create_connection(self._place, timeout=ANSWER).close()
             except OSError as error:
                 raise WireError(refusal_of(error, "Modbus")) from error
@@ -108,11 +108,11 @@ class ModbusWire:
 
     def close(self) -> None:
         """Disconnect."""
-        with suppress(Exception):  # errors are of no interest now
+        with suppress(Exception):  # errors have no effect any longer
             self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:
-        """End all waits of the connection; called from another thread."""
+        """End all waits of the connection. Another thread calls this method."""
         connection = self._client.socket
         with suppress(OSError):
             if connection is not None:

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 PORT: Final = 102
 PDU: Final = 240  # [bytes], PDU size of an S7-1200; each block fits in one request
 RACK: Final = 0
-FORBIDDEN: Final = 0x8104  # answer of a CPU with settings that do not permit PUT or GET
-_NAME: Final = "Connection"  # names of the class with IPv6
+FORBIDDEN: Final = 0x8104  # error code of a CPU whose settings do not permit PUT or GET
+_NAME: Final = "Connection"  # names of the connection class with IPv6
 _CLOSED: Final = Refusal("the connection was closed", "Connect again")
 SLOT: Final = 1  # rack and slot of every S7-1200 and S7-1500
 
-logging.getLogger("snap7").addHandler(logging.NullHandler())  # the link itself reports errors
+logging.getLogger("snap7").addHandler(logging.NullHandler())  # the link itself reports errors, so the library need not
 
 
 class S7Link(BlockLink):
@@ -50,22 +50,22 @@ class S7Link(BlockLink):
             addresses: "host", "host:port" or "[IPv6]:port" of each group's PLC, in the order of the groups,
                 or one text with commas between them.
             robot: The robot, or its number of winches.
-            timeout: Longest time to the first answers [s].
+            timeout: Longest wait for the first answers [s].
 
         Raises:
-            InvalidValueError: If the number of addresses is not the number of groups, or two addresses are equal.
+            InvalidValueError: If the number of addresses is not the number of groups. If two addresses are equal.
             LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If python-snap7 is not installed.
         """
         places = addresses_of(addresses, PORT)
-        super().__init__(places, robot, [S7Wire(*place) for place in places], timeout)
+        super().__init__(places, robot, [_S7Wire(*place) for place in places], timeout)
 
 
-class S7Wire:
+class _S7Wire:
     """Connection to one PLC over S7."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Store the address; `open` connects."""
+        """Store the address. The method `open` connects."""
         with plc_packages():
             import snap7
             import snap7.client
@@ -104,7 +104,7 @@ class S7Wire:
     def close(self) -> None:
         """Disconnect."""
         client, self._client = self._client, None
-        with suppress(Exception):  # errors are of no interest now
+        with suppress(Exception):  # errors have no effect any longer
             if client is not None:
                 client.disconnect()
 
@@ -115,7 +115,7 @@ class S7Wire:
         return self._client
 
     def abort(self) -> None:
-        """End all waits of the connection; called from another thread."""
+        """End all waits of the connection. Another thread calls this method."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:
@@ -132,7 +132,7 @@ class S7Wire:
 
 
 def _with_ipv6(library: Any) -> Any:
-    """The library's connection with support for IPv6."""
+    """The connection class of the library, extended to IPv6."""
 
     def connect(self: Any) -> None:
         self.socket = socket.create_connection((self.host, self.port), self.timeout)
@@ -142,7 +142,7 @@ def _with_ipv6(library: Any) -> Any:
 
 
 def _socket(client: Client) -> socket.socket:
-    """The library's socket with a timeout, because the library has no setting for it."""
+    """The socket of the library, with a timeout. The library has no setting for a timeout."""
     connection = client.connection
     if connection is None or connection.socket is None:
         raise WireError(_CLOSED)

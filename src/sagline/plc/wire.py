@@ -25,7 +25,7 @@ class Address(NamedTuple):
     port: int  # TCP port
 
     def __str__(self) -> str:
-        """Address as host:port, or as [host]:port for IPv6."""
+        """The address as text: host:port, or [host]:port for IPv6."""
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
 
@@ -51,7 +51,7 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
 
 
 def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[int, ...], ...]:
-    """Winches of each group; raise an error if the number of addresses is not the number of groups."""
+    """Winches of each group. Raise an error if the number of addresses is not the number of groups."""
     known: Any = robot
     winches = known.cable_count if isinstance(known, Robot) else whole_number(known, "robot", 1, MOST_ADDRESSES)
     groups = groups_of(winches)
@@ -98,7 +98,7 @@ def _is_ipv6(host: str) -> bool:
     return True
 
 
-ANSWER: Final = 0.5  # longest wait for an answer, before the connection is opened again [s]
+ANSWER: Final = 0.5  # longest wait for an answer [s]; then the connection is opened again
 
 
 class LinkError(SaglineError):
@@ -133,7 +133,7 @@ class WireError(Exception):
 
 
 class Wire(Protocol):
-    """Connection to one PLC. Its methods raise `WireError`. One thread calls all except `abort` and `reached`."""
+    """Connection to one PLC. Its methods raise `WireError`. Other threads may call only `abort` and `reached`."""
 
     def open(self) -> None:
         """Connect. The longest wait depends on the protocol."""
@@ -145,10 +145,10 @@ class Wire(Protocol):
         """Write the bytes of a block."""
 
     def close(self) -> None:
-        """Disconnect; raise no error."""
+        """Disconnect without raising an error."""
 
     def abort(self) -> None:
-        """End all waits of the connection; called from another thread."""
+        """End all waits of the connection. Another thread calls this method."""
 
     def reached(self) -> bool:
         """True if the connection is open."""
@@ -156,7 +156,7 @@ class Wire(Protocol):
 
 @contextmanager
 def plc_packages() -> Iterator[None]:
-    """Context manager for the import of a package for PLCs; a missing package is reported."""
+    """Context manager for the import of a package for PLCs, which reports a missing package."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 PARTS: Final = ("all", "residuals", "correlation", "errors")
 BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # for each band, its half width in standard deviations and its opacity
 REACH: Final = 5.0  # largest residual on the axis [standard deviations]; larger ones are drawn at the edge
-MOST_POSES: Final = 1500  # largest number of drawn poses; a longer log has an even selection and all outliers
-MOST_NAMED: Final = 8  # largest number of outliers with a name
+MOST_POSES: Final = 1500  # largest number of drawn poses; of a longer log, an even selection and all outliers are drawn
+MOST_NAMED: Final = 8  # largest number of outliers whose name is written
 POINTS: Final = 25  # number of points along each side of a map
 MARKS: Final = ("o", "s", "^", "D")
 PANEL, MATRIX, BESIDE, MAP = 1.3, 3.8, 1.2, 2.7  # heights of panel and matrix; extra height and width of a map [in]
-LINE: Final = 1.3 / 72.0  # height of a name in a font of 1 pt [in]
+LINE: Final = 1.3 / 72.0  # height of a name in a font of 1 pt [in], which is scaled with the font size
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
-SHRUNK: Final = 1.5  # a figure is higher than a slide if its parts would otherwise be reduced by more than this factor
+SHRUNK: Final = 1.5  # a figure may be higher than a slide if otherwise its parts would become smaller than this factor
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # [mm]
 
@@ -51,14 +51,14 @@ _Kind: TypeAlias = "tuple[str, Array, tuple[str, ...], str]"
 def calibration(found: Calibration, part: str = "all", *, height: float | None = None) -> Figure:
     """Residuals, correlations and expected errors of a calibration.
 
-    Residuals are in standard deviations of their sensors, in the order of the rows of the log. The bands are one and
-    two standard deviations wide. Outliers have a ring, and values off the scale are triangles at the edge. The
-    correlation matrix has all estimated parameters, grouped by kind. The maps show the expected position error on a
-    level slice, before (from the priors) and after the calibration. Translations and rotations of the world do not
-    count in the maps if the readings do not observe them.
+    The unit of a residual is the standard deviation of its sensor. Residuals are in the order of the rows of the log.
+    The bands are one and two standard deviations wide. Outliers have a ring, and values off the scale are triangles at
+    the edge. The correlation matrix has all estimated parameters, grouped by kind. The maps show the expected position
+    error on a level slice, before (from the priors) and after the calibration. The maps do not include translations and
+    rotations of the world that the readings do not observe.
 
     Args:
-        found: From `calibrate`.
+        found: Result of `calibrate`.
         part: "residuals", "correlation" or "errors"; "all" for these three parts.
         height: Height of the slice [m]; None for the middle of the calibration's poses.
 
@@ -66,7 +66,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
         The figure.
 
     Raises:
-        InvalidValueError: If `found` is not a calibration, or `part` does not exist.
+        InvalidValueError: If `found` is not a calibration. If `part` does not exist.
 
     Examples:
         >>> import sagline as sl
@@ -93,7 +93,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
 
 
 def _kinds(found: Calibration) -> list[_Kind]:
-    """The residuals, grouped by the kind of reading."""
+    """Residuals of the calibration, one entry per kind of reading."""
     sensors, m = found.sensors, found.robot.cable_count
     cables, axes = tuple(f"cable {k}" for k in range(m)), ("$x$", "$y$", "$z$")
     spans = (
@@ -162,7 +162,7 @@ def _mark_outliers(ax: Axes, found: Calibration, quantity: str) -> None:
 
 
 def _correlation(figure: SubFigure, found: Calibration) -> None:
-    """Draw the correlation matrix, with lines between the kinds of parameters, and the names of the kinds."""
+    """Draw the correlation matrix. Lines separate the kinds of parameters, whose names are written."""
     ax = figure.subplots()
     ax.set_facecolor(GAP_COLOR)
     image = ax.imshow(found.correlation, vmin=-1.0, vmax=1.0, cmap="PuOr_r", interpolation="nearest", rasterized=True)
@@ -223,7 +223,7 @@ def _height_of_maps(found: Calibration) -> float:
 
 
 def _before(found: Calibration) -> Calibration:
-    """The state before the calibration: uncalibrated robot, prior values and prior deviations."""
+    """Calibration object for the state before: uncalibrated robot, prior values and prior deviations."""
     numbers = found.parameters
     return replace(
         found, robot=found.before, values=numbers.prior, covariance=locked(np.diag(numbers.prior_deviation**2))
@@ -231,7 +231,7 @@ def _before(found: Calibration) -> Calibration:
 
 
 def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:
-    """Coordinates of a level grid at the height `at`, over the robot's test box or over the poses of the log."""
+    """Coordinates of a level grid at the height `at` that covers the robot's test box or the poses of the log."""
     low, high = found.poses.position.min(axis=0), found.poses.position.max(axis=0)
     box = found.robot.test_box
     if box is not None:

@@ -35,15 +35,15 @@ AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
 USUAL: Final = view_axes(float(AZIMUTH), float(ELEVATION))
 GROUND, BODY = (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16)
 GAP: Final = 1.3  # width of the gap in a line behind another line [pt]
-SPECK: Final = 1.5  # pieces of a line between two gaps are omitted if they are shorter [pt]
+SPECK: Final = 1.5  # a piece of a line between two gaps is omitted if it is shorter than this [pt]
 SPARE: Final = 0.05  # margin around the drawing, as a share of the picture
 LEAST, MOST = 0.35, 1.1  # smallest and largest ratio of height to width
-PLACES: Final = np.linspace(0.12, 0.72, 31)  # positions for the number along a cable, from the frame end, 0 to 1
-BESIDE, ROOM = 0.8, 0.8  # distances of a number from its own cable and from other lines, in text sizes
-CLEAR = 1.15  # distance from other lines, in text sizes, of a number that is next to its cable
-FROM_ANCHOR = 1.6  # distance of a number from the frame end, in text sizes
-ARROW: Final = 0.16  # largest length of the axes, as a share of the picture's width
-END_ON: Final = 0.12  # an axis that appears shorter than this share of its length has no name
+PLACES: Final = np.linspace(0.12, 0.72, 31)  # possible positions of the number along a cable, 0 at the frame end
+BESIDE, ROOM = 0.8, 0.8  # distances of a number from its own cable and from other lines, in units of the text size
+CLEAR = 1.15  # distance between other lines and a number that is next to its cable, in units of the text size
+FROM_ANCHOR = 1.6  # distance of a number from the frame end, in units of the text size
+ARROW: Final = 0.16  # largest length of the drawn world axes, as a share of the picture's width
+END_ON: Final = 0.12  # a world axis that appears shorter than this share of its length has no name
 
 
 def drawing(
@@ -57,7 +57,7 @@ def drawing(
 
     The drawing contains only the visible parts of lines. A cable is interrupted where it passes behind another cable,
     the frame or the platform. Every cable has its number and the color of its chord tension. The projection is
-    parallel. The three axes at the ground have equal lengths, and this length is written next to them.
+    parallel. The three axes at the ground have equal lengths; their length is written next to the axes.
 
     Args:
         robot: The robot.
@@ -71,8 +71,8 @@ def drawing(
         The axes; their coordinates are to the right and up in the picture [m].
 
     Raises:
-        InvalidValueError: If no pose is given and the robot has no test box, the pose is a batch, or the viewer looks
-            up from under the ground.
+        InvalidValueError: If no pose is given and the robot has no test box. If the pose is a batch. If the viewer
+            looks up from under the ground.
 
     Examples:
         >>> import sagline as sl
@@ -108,7 +108,7 @@ def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USU
 
 
 def _axes(ax: Axes | None, points: Array, *, bar: bool) -> Axes:
-    """Axes with equal scales, whose limits fit the `points` (n, 2) of the picture."""
+    """Axes with equal scales and with limits that fit the `points` (n, 2) of the picture."""
     low, high = points.min(axis=0), points.max(axis=0)
     spare = SPARE * float((high - low).max())
     low, high = low - spare, high + spare
@@ -128,7 +128,7 @@ def _draw_lines(
     ax: Axes, cables: list[Stroke], others: list[Stroke], facing: list[Array], view: Array, flat: Array
 ) -> None:
     """Draw the visible parts of all lines in front of the faces `facing` (4, 3) and the ground `flat` (n, 2)."""
-    # widths and gaps are computed for the size on paper
+    # widths and gaps depend on the size on paper
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()
     point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # [m]
@@ -167,7 +167,7 @@ def _seen_from_outside(face: Array) -> bool:
 
 
 def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
-    """Positions of the cables' numbers. A number is on its cable, or next to it if another cable is too close."""
+    """Positions of the numbers of the cables: on the cable, or next to it if another cable is too close."""
     starts = np.concatenate([course[:-1] for course in courses])
     steps = np.concatenate([course[1:] for course in courses]) - starts
     owners = np.repeat(np.arange(len(courses)), [len(course) - 1 for course in courses])
@@ -181,7 +181,7 @@ def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: f
         candidates = np.concatenate((on, on + across, on - across))
         other = owners != k
         beside = np.arange(len(candidates)) >= len(on)
-        space = np.where(beside, CLEAR, ROOM) * size  # the number's own cable must be the nearest
+        space = np.where(beside, CLEAR, ROOM) * size  # the cable of the number must be the nearest cable
         free = np.minimum(_distances(candidates, starts[other], steps[other]) / space, 1.0)
         free = np.minimum(free, np.linalg.norm(candidates - cable[0], axis=1) / (FROM_ANCHOR * size))
         for place in chosen:
@@ -192,7 +192,7 @@ def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: f
 
 
 def _distances(points: Array, starts: Array, steps: Array) -> Array:
-    """Distances (n,) from `points` (n, 2) to their nearest segments; `starts`, `steps`: the S segments (S, 2)."""
+    """Distances (n,) of `points` (n, 2) from the nearest of S segments. `starts`, `steps`: the segments, (S, 2)."""
     square = np.einsum("sc,sc->s", steps, steps)
     away = points[:, None] - starts
     share = np.einsum("nsc,sc->ns", away, steps) / np.where(square > 0.0, square, 1.0)
@@ -201,7 +201,7 @@ def _distances(points: Array, starts: Array, steps: Array) -> Array:
 
 
 def _label_boxes(places: Sequence[Array], size: float) -> list[Array]:
-    """Boxes around numbers in which no line is drawn; each has its corners (4, 2) in order."""
+    """Corners (4, 2), in order, of a box around each number; no line is drawn in a box."""
     corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     return [place + corners * (0.35 * size * len(str(k)) + 0.1 * size, 0.55 * size) for k, place in enumerate(places)]
 

@@ -17,7 +17,7 @@ from sagline.core.arguments import choice, instance, listed, text
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
-from sagline.dynamics.vibration.response import FrequencyResponse, curves_of_response, response_curves
+from sagline.dynamics.vibration.response import FrequencyResponse, ResponseCurves
 from sagline.dynamics.vibration.vibration import Vibration
 from sagline.plot import sheet
 from sagline.plot.labels import legend_above, name_lines, set_heading
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 THIN, WIDE = 0.6, 3.6  # line width if only the cables move, and if only the platform moves [pt]
 FAINT = 0.4  # opacity of thin lines
 SHARES = (1.0, 0.5, 0.0)  # platform shares that the legend shows
-PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # number of heights -> panels per row, so that no panel is empty
-HIGHEST, LOWEST = 2e2, 1e-3  # limits of the axis relative to the static response; undamped curves have none
-MARK = 0.035  # length of the longest mark of a mode, as a share of the axes' height
+PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # number of heights -> panels per row, without empty panels
+HIGHEST, LOWEST = 2e2, 1e-3  # limits of the axis, relative to the static response, because undamped curves are infinite
+MARK = 0.035  # length of the longest mark of a mode, as a share of the height of the axes
 FAINTEST = 0.15  # opacity of the mark of a mode without platform motion
 
 
@@ -44,12 +44,12 @@ def frequencies(
 ) -> Axes:
     """Natural frequencies along a path (Campbell diagram): with cable mass, and massless (dashed).
 
-    Width and opacity of a line show the platform's share of the mode's kinetic energy. If a wide line fades while its
-    neighbor becomes wide, the motion passes from one mode to the other.
+    Width and opacity of a line show the platform's share of the kinetic energy of the mode. If a wide line becomes thin
+    while its neighbor becomes wide, the platform's motion passes from one mode to the other.
 
     Args:
         vibrations: Vibrations of N successive states, from `vibration`.
-        time: Ascending times or other abscissae of the states, shape (N,), with the unit in `label`; None for indices.
+        time: Times or other abscissae of the states, ascending, shape (N,). `label` gives their unit. None for indices.
         label: Label of the time axis, with its unit.
         ax: Axes to draw on; None for a new figure.
 
@@ -57,7 +57,7 @@ def frequencies(
         The axes.
 
     Raises:
-        InvalidValueError: If there are fewer than two vibrations, or if `time` has another number of values.
+        InvalidValueError: If there are fewer than two vibrations. If `time` has another number of values.
 
     Examples:
         >>> import sagline as sl
@@ -90,7 +90,7 @@ def frequencies(
 
 
 def _swinging(states: tuple[Vibration, ...], clock: Array) -> LineCollection:
-    """Segments between neighboring `states`. The share of a segment is the mean share of its two ends."""
+    """Segments of lines between neighboring `states`. A segment has the mean platform share of its two ends."""
     pieces, shares = [], []
     for (first, one), (second, other) in pairwise(zip(clock, states, strict=True)):
         count = min(one.frequency.size, other.frequency.size)
@@ -109,7 +109,7 @@ def _widths(share: Array) -> Array:
 
 
 def _colors(share: Array) -> list[tuple[float, float, float]]:
-    """Colors mixed with white, because transparent lines would be darker where their ends overlap."""
+    """Colors for platform shares, mixed with white: transparent lines would be darker where their ends overlap."""
     dense = FAINT + (1.0 - FAINT) * share
     red, green, blue = (1.0 - dense * (1.0 - part) for part in to_rgb(sheet.BLUE))
     return list(zip(red.tolist(), green.tolist(), blue.tolist(), strict=True))
@@ -134,7 +134,7 @@ MAP_QUANTITIES: Final = {  # attribute of a map -> label; the scale of "peak" is
 
 
 def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
-    """One quantity of a map over a grid of poses, with one panel for each of several heights.
+    """One quantity of a frequency map over a grid of poses, with one panel for each of several heights.
 
     Args:
         found: Map from `frequency_map`, of poses on a grid along x, y and z.
@@ -144,7 +144,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
         The figure; cells without a solution are hatched.
 
     Raises:
-        InvalidValueError: If `quantity` does not exist, or if the poses are not on a grid.
+        InvalidValueError: If `quantity` does not exist. If the poses are not on a grid.
 
     Examples:
         >>> import sagline as sl
@@ -158,7 +158,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     label = MAP_QUANTITIES[choice(quantity, "quantity", MAP_QUANTITIES)]
     x, y, z, values = _gridded(instance(found, FrequencyMap, "found"), getattr(found, quantity))
     shown = max(count for count in PANELS if count <= z.size)
-    rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # the lowest, the highest, and some heights between
+    rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # lowest, highest and some heights between
     known = values[:, :, rows][np.isfinite(values[:, :, rows])]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.5, 1.0)
     scale = LogNorm(low, max(high, 1.01 * low)) if quantity == "peak" and low > 0.0 else Normalize(low, high)
@@ -166,7 +166,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     count, each = shown // columns, current().width / columns
     tall = np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.4, 1.4) * each
     figure = sheet.sheet(1.4 + count * (0.85 * float(tall) + 0.5))
-    figure.set_layout_engine("compressed")  # panels of equal scales
+    figure.set_layout_engine("compressed")  # the panels have equal scales
     panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
     for ax, row in zip(panels.flat, rows, strict=True):
         sheet.draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
@@ -193,22 +193,22 @@ def _gridded(found: FrequencyMap, values: Array) -> tuple[Array, Array, Array, A
 def response(
     vibration: Vibration | FrequencyResponse, force: str = "x", motion: str | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Amplitude of the platform's motion for a force of 1 N, over frequency, with cable mass and with massless cables.
+    """Amplitude of the platform's motion per force over frequency, with cable mass and with massless cables.
 
-    Marks at the bottom are the modes with cable mass; darker marks have a larger platform share.
+    Marks at the bottom are the modes with cable mass; a darker mark means a larger platform share.
 
     Args:
         vibration: Vibration of a stable state, from `vibration`; both curves have its damping. A result of
             `frequency_response` is drawn at its own frequencies, without marks of modes.
         force: "x", "y" or "z" for a force along this axis [N]; "about x", "about y" or "about z" for a moment [N m].
-        motion: Motion to draw, with the names of `force`; None for the motion along the force or about the moment.
+        motion: Motion to draw, with one of the names for `force`. None: along the force or about the moment.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
         The axes, both logarithmic.
 
     Raises:
-        InvalidValueError: If the vibration has no modes, if the response has no frequencies, or if the motion does not
+        InvalidValueError: If the vibration has no modes. If the response has no frequencies. If `motion` does not
             exist.
 
     Examples:
@@ -219,9 +219,9 @@ def response(
         >>> axes = sl.plot.response(found)
     """
     if isinstance(vibration, FrequencyResponse):
-        curves, modes = curves_of_response(vibration, force, motion), []
+        curves, modes = ResponseCurves.of_response(vibration, force, motion), []
     else:
-        curves = response_curves(vibration, force, motion)
+        curves = ResponseCurves.of_vibration(vibration, force, motion)
         modes = list(zip(vibration.frequency, vibration.platform_share, strict=True))
     ax = sheet.axes_or_new(ax)
     ax.loglog(curves.frequency, curves.with_mass, color=sheet.BLUE, linewidth=1.2, label="with cable mass", zorder=2.2)

@@ -22,15 +22,15 @@ from sagline.viewer.swing import PERIOD, Swing
 if TYPE_CHECKING:
     from sagline.core.progress import Progress
 
-SECONDS = 10.0  # duration of the animation [s]; it has whole periods, so that it repeats without a jump
+SECONDS = 10.0  # duration of the animation [s]; the animation has whole periods, so that it repeats without a jump
 PICTURES = 25  # pictures per period
 HEIGHT, DOTS = 3.8, 140  # height of a picture [in], and dots per inch
 COLORS = 48
-LEAST_SHARE = 0.01  # cables with a smaller share of the energy are not named
+LEAST_SHARE = 0.01  # a cable with a smaller share of the energy is not named
 
 
 def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, progress: Progress | None = None) -> None:
-    """Write an animation of a mode with cable mass as a GIF, which has ten seconds and repeats.
+    """Write an animation of a mode with cable mass as a GIF. The animation has ten seconds and repeats.
 
     Args:
         vibration: Vibration, from `vibration`.
@@ -40,7 +40,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
 
     Raises:
         InvalidValueError: If the mode does not exist.
-        FileError: If the file cannot be written, or its suffix is not .gif.
+        FileError: If the file cannot be written. If its suffix is not .gif.
 
     Examples:
         >>> import sagline as sl
@@ -69,7 +69,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
 
 
 def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
-    """Pictures of one period; all have the same color table."""
+    """Pictures of one period, which all have the same color table."""
     robot, mode = swing.state.one_robot, swing.mode
     figure = sheet(HEIGHT)
     canvas: Any = FigureCanvasAgg(figure)
@@ -88,7 +88,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     ax.set_axis_off()
     ax.view_init(elev=18.0, azim=-62.0)
     ax.set_title(f"{robot.name}, mode {mode.number}: {mode.frequency:.3f} Hz {mode.kind}", fontsize=LABEL, y=0.97)
-    figure.text(0.5, 0.02, f"{energy_shares(mode)}; {swing.text}", fontsize=TICK, ha="center")
+    figure.text(0.5, 0.02, f"{_energy_shares(mode)}; {swing.text}", fontsize=TICK, ha="center")
     drawn = []
     for k in range(PICTURES):
         phase = 2.0 * np.pi * k / PICTURES
@@ -106,8 +106,8 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     return [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in drawn]
 
 
-def energy_shares(mode: ListedMode) -> str:
-    """Text of the platform's and the cables' shares of a mode's kinetic energy."""
+def _energy_shares(mode: ListedMode) -> str:
+    """Text with the shares of platform and cables in the kinetic energy of a mode."""
     words = f"kinetic energy: platform {100.0 * mode.platform_share:.0f} %"
     if mode.cable is None or mode.cable_share < LEAST_SHARE:
         return f"{words}, each cable less than {100.0 * LEAST_SHARE:g} %"

@@ -1,4 +1,4 @@
-"""Candidates of an optimization, and the best of them."""
+"""Figure of the candidates of an optimization, with the best candidates marked."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ EACH = 3.2  # height of a panel [in]
 def front(front: Front) -> Figure:
     """The best robots found by `design`, and all candidates.
 
-    With one goal, the figure shows the progress of the search: each candidate, and the best one so far. With several
-    goals, it shows the first goal against each other goal. A line connects the best robots, and the start is marked.
+    With one goal, the figure shows the progress: each candidate, and the best candidate so far. With several goals, it
+    shows the first goal against each other goal. A line connects the best robots.
 
     Args:
         front: Result of `design`.
@@ -58,7 +58,9 @@ def _draw_course(ax: Axes, front: Front) -> None:
     values = front.evaluated_values[:, 0]
     number = np.arange(len(values))
     ax.plot(number, values, ".", color=GAP_COLOR, markersize=3.0, label="candidates", linestyle="none")
-    ax.plot(number, best_until(values, highest=front.goals[0].maximize), color=BLUE, linewidth=1.4, label="best so far")
+    ax.plot(
+        number, _best_until(values, highest=front.goals[0].maximize), color=BLUE, linewidth=1.4, label="best so far"
+    )
     ax.axhline(front.start_values[0], color=VERMILLION, linewidth=1.0, linestyle="--", label="start")
     format_axes(ax, "candidate", _label_of(front.goals[0]))
     known = values[np.isfinite(values)]
@@ -85,7 +87,7 @@ def _label_of(goal: Goal) -> str:
     return f"{goal.kind.replace('_', ' ')}{unit}, {'higher' if goal.maximize else 'lower'} is better"
 
 
-def best_until(values: Array, *, highest: bool) -> Array:
+def _best_until(values: Array, *, highest: bool) -> Array:
     """Best value of all candidates up to each index; NaN before the first finite value."""
     sign = 1.0 if highest else -1.0
     found = np.maximum.accumulate(np.where(np.isfinite(values), sign * values, -np.inf))

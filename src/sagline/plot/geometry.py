@@ -1,4 +1,4 @@
-"""Hidden line removal in parallel projection, and division of triangles where the limit of a workspace changes.
+"""Hidden line removal in parallel projection, and division of triangles at borders between limiting criteria.
 
 Sorting by distance is not sufficient, because each of three cables can pass in front of the next one. In parallel
 projection all quantities are linear along a segment. The ends of hidden parts are therefore exact intersections of
@@ -14,11 +14,11 @@ import numpy as np
 
 from sagline.core.arrays import Array, Indices
 
-FLAT = 1e-9  # surfaces and lines with a smaller extent hide nothing; share of the picture's size
-TOUCHING = 1e-6  # a line this close to a surface is on it, not behind it; share of the picture's size
+FLAT = 1e-9  # surfaces and lines with a smaller extent, relative to the picture's size, hide nothing
+TOUCHING = 1e-6  # a line this close to a surface is on it, not behind it; relative to the picture's size
 CHUNK = 2_000_000  # number of pairs of segments and limits per block
 FAR = 1e3  # depth of a plane in front of all lines and surfaces, in picture sizes
-ALONG = 3.0  # largest length that a strip hides of a nearly parallel line, divided by the strip's width
+ALONG = 3.0  # largest hidden length of a line nearly parallel to a strip, divided by the strip's width
 
 
 class FlatLine(NamedTuple):
@@ -26,9 +26,9 @@ class FlatLine(NamedTuple):
 
     Attributes:
         points: Coordinates to the right, up, and toward the viewer [m], shape (P, 3).
-        half_width: Half of the line's width [m], within which it hides lines behind it; 0 if it hides nothing.
-        gap: Additional distance at crossings [m]. A line that is less than half_width + gap behind this line, such as a
-            cable that ends at the same anchor, is not hidden.
+        half_width: Half of the width [m] within which the line hides lines behind it; 0 if it hides nothing.
+        gap: Additional distance at crossings [m]. A line is not hidden if it is less than half_width + gap behind this
+            line, as is a cable that ends at the same anchor.
     """
 
     points: Array
@@ -42,7 +42,7 @@ _Piece = tuple[Array, float, int, int]
 
 
 class _Covers(NamedTuple):
-    """R flat convex pieces that hide lines behind them, as in `_Piece`; K limits are the sides of a piece."""
+    """R flat convex pieces, as `_Piece`, that hide lines behind them. The K limits of a piece are its sides."""
 
     normals: Array  # outward normals of the limits in the picture, shape (R, K, 2)
     offsets: Array  # largest products of each normal and a position in the piece, shape (R, K)
@@ -99,8 +99,8 @@ def _rest(spans: Array) -> list[tuple[float, float]]:
 
 
 def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Hidden spans (n, 2) of each of S segments, from 0 at the start of a segment to 1 at its end."""
-    # A span is within all limits and behind the plane: all K + 1 linear functions along it are <= 0.
+    """Hidden spans (n, 2) of each of S segments, in numbers from 0 at the start of a segment to 1 at its end."""
+    # In a hidden span, the segment is within all limits and behind the plane: K + 1 linear functions are <= 0.
     steps = ends - starts
     outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
     rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
@@ -118,7 +118,7 @@ def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> lis
 
 
 def _covers(lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Piece], size: float) -> _Covers:
-    """All pieces: the surfaces, strips along the lines, and wider strips at crossings."""
+    """All pieces that hide lines: surfaces, strips along lines, and wider strips at crossings."""
     pieces: list[_Piece] = []
     for number, line in enumerate(lines):
         long = np.linalg.norm(np.diff(line.points[:, :2], axis=0), axis=1) > FLAT * size
@@ -139,7 +139,7 @@ def _covers(lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Seq
 
 
 def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: Indices) -> list[_Piece]:
-    """Strips at crossings at which a line that hides others passes in front of another line."""
+    """Strips at all crossings where a line that can hide others passes in front of another line."""
     steps = ends - starts
     hides = np.array([line.half_width + line.gap for line in lines])[owners]
     front = np.flatnonzero(hides > 0.0)
@@ -190,8 +190,8 @@ Find = Callable[[Array], Indices]
 
 
 def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find) -> tuple[Array, Indices]:
-    """Divide triangles (T, 3) of points (V, d) at borders of `limit` (V,): corners (U, 3, d) and codes (U,)."""
-    # each part has a single limit; `find` gives the codes of points (n, d)
+    """Divide triangles (T, 3) of points (V, d) where `limit` (V,) changes. Returns corners (U, 3, d) and codes (U,)."""
+    # each new triangle has a single limit; `find` gives the codes of the limits at points (n, d)
     codes = limit[triangles]
     mixed = (codes != codes[:, :1]).any(axis=1)
     corners, whole = [points[triangles[~mixed]]], [codes[~mixed, 0]]
@@ -207,7 +207,7 @@ def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find)
 
 
 def _borders(ends: Array, codes: Indices, find: Find) -> Array:
-    """Points of the edges `ends` (E, 2, d) at which the limit changes, by bisection; middles of all other edges."""
+    """Points of the edges `ends` (E, 2, d) where the limit changes, by bisection. Other edges give their middles."""
     ends = ends.copy()
     change = np.flatnonzero(codes[:, 0] != codes[:, 1])
     for _ in range(BISECTIONS):
@@ -218,7 +218,7 @@ def _borders(ends: Array, codes: Indices, find: Find) -> Array:
 
 
 def _pieces(tips: Array, borders: Array, codes: Indices) -> list[tuple[Array, tuple[Array, Array], Indices]]:
-    """Six parts of each triangle, between its corners, the borders on its edges and a common point."""
+    """Six parts of each triangle. Corners of the parts: the triangle's corners, borders on its edges, and one point."""
     # If a triangle has two limits, the common point is midway between both borders, so that the border is straight.
     changes = codes != np.roll(codes, -1, axis=1)
     weight = changes[:, :, None] / changes.sum(axis=1)[:, None, None]

@@ -36,11 +36,11 @@ LENGTHS = {
     "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
 }
 POINT = 1.0 / 72.0  # [in]
-WIDE = {SANS: 0.58, SERIF: 0.48}  # mean width of a letter in text sizes
+WIDE = {SANS: 0.58, SERIF: 0.48}  # mean width of a letter, in units of the text size
 SHARE = 0.9  # largest width of a heading, as a share of the figure's width
 MOST = 0.3  # largest width of names next to the axes, as a share of the figure's width
-SPACING = 1.15  # distance between two names, in text sizes
-END = 0.02  # lines that end at a larger distance from the right side have no name there; share of the axes' width
+SPACING = 1.15  # distance between two names, in units of the text size
+END = 0.02  # a line that ends farther from the right side (share of the axes' width) has no name there
 LEADER = 8.0  # distance from the end of a line to its name [pt]
 
 
@@ -65,7 +65,7 @@ def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outs
 
 
 def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
-    """Arguments for a legend above the axes `ax`, in as many columns as fit."""
+    """Arguments for a legend above the axes `ax`, with as many columns as fit."""
     look = current()
     width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
     columns = legend_columns([*labels, title], 0.85 * width, look.tick)
@@ -77,7 +77,7 @@ def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, 
 
 
 def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
-    """Number of legend columns, at least 1: as many as fit the width and are not empty."""
+    """Number of legend columns, at least 1: as many as fit the width without empty columns."""
     widest = max((TextPath((0.0, 0.0), label, size=size).get_extents().width for label in labels if label), default=0.0)
     columns = max(1, min(len(labels), int((width / POINT + 1.2 * size) / (widest + 3.6 * size))))
     return ceil(len(labels) / ceil(len(labels) / columns))
@@ -96,28 +96,16 @@ def wrap_heading(text: str, size: float) -> str:
     return fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
 
 
-def break_labels(figure: Figure) -> None:
-    """Break vertical axis labels into two lines if they are longer than their axes."""
-    for ax in figure.axes:
-        words = ax.yaxis.get_label_text().split(" ")
-        length, height = ax.yaxis.label.get_window_extent().height, ax.bbox.height
-        if length > height and len(words) > 2 and "\n" not in ax.yaxis.get_label_text():
-            lines = [(" ".join(words[:k]), " ".join(words[k:])) for k in range(1, len(words))]
-            whole = [pair for pair in lines if all(line.count("$") % 2 == 0 for line in pair)]  # no broken formulas
-            if whole:
-                ax.yaxis.label.set_text("\n".join(min(whole, key=lambda pair: max(map(len, pair)))))
-
-
 def _is_line(handle: Artist) -> TypeGuard[Line2D]:
-    """True for a line with more than two points. False for a mark across the axes, and for a set of points."""
+    """True for a line with more than two points, but not for a mark across the axes or a set of points."""
     if not isinstance(handle, Line2D) or handle.get_linestyle() in ("None", "", " "):
         return False
     return np.size(np.asarray(handle.get_xdata())) > 2
 
 
 def _ends(ax: Axes, handles: Sequence[Artist]) -> list[tuple[Line2D, Array, float]]:
-    """Lines, their ends in data units, and heights of the ends in the axes, 0 to 1; empty if there is no space."""
-    # There is no space if an end is not at the right side, or if there are too many or too long names.
+    """Lines, their ends in data units, and heights of the ends in the axes, 0 to 1. Empty if names have no space."""
+    # Names have no space if an end is not at the right side, or if they are too many or too long.
     figure, look = cast(Figure, ax.get_figure(root=True)), current()
     lines = [handle for handle in handles if _is_line(handle)]
     longest = max((len(str(line.get_label())) for line in lines), default=0)
@@ -160,7 +148,7 @@ def _write(ax: Axes, ends: Sequence[tuple[Line2D, Array, float]], title: str) ->
 
 
 def write_beside(ax: Axes, text: str, place: Any, offset: Any, **look: Any) -> None:
-    """Write `text` at `offset` [pt] from `place`, which is in data units without other `xycoords`."""
+    """Write `text` at `offset` [pt] from `place`. The unit of `place` is that of the data, or as `xycoords` says."""
     defaults: dict[str, Any] = {"fontsize": current().tick, "ha": "center", "va": "center", "annotation_clip": False}
     (x, y), (right, up) = place, offset
     ax.annotate(text, (x, y), xytext=(right, up), textcoords="offset points", **(defaults | look))
@@ -172,7 +160,7 @@ def _points(ax: Axes) -> float:
 
 
 def spread_heights(heights: Array, spacing: float) -> Array:
-    """`heights` of names in order, moved apart to distances of at least `spacing` by the least squared movements."""
+    """Ordered `heights` of names, moved apart to at least `spacing`. The sum of the squared movements is least."""
     order = np.argsort(heights, kind="stable")
     steps = spacing * np.arange(heights.size)
     placed = np.asarray(isotonic_regression(heights[order] - steps).x)

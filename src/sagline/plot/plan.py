@@ -25,23 +25,23 @@ if TYPE_CHECKING:
 
 OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"
-LEAST_ERROR = 1e-3  # smallest range of the axis [mm], so that rounding errors are a flat line
-FLAT = 0.01  # errors below this share of the axis look like a flat line, and are written as a number
+LEAST_ERROR = 1e-3  # smallest range of the axis [mm], so that rounding errors appear as a flat line
+FLAT = 0.01  # errors below this share of the axis appear as a flat line, and are also written as a number
 UNCONFIRMED = "not confirmed"  # color of planned lengths without a stable equilibrium
-OTHER_CABLES = "0.82"  # color of the other cables in the background of each panel
+OTHER_CABLES = "0.82"  # color of the other cables, which are in the background of a panel
 ROW_HEIGHT = 1.45  # height of a row of panels [in]
 LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
 START_COLOR = "#A84300"  # a vermilion that is dark enough for text
 WIDTH, SIDE = 4.4, 1.5  # width of the axes of a top view, and height of the panel of z [in]
 MOST_ARROWS = 100  # number of arrows along a path
-LEVEL = 1e-9  # paths with a smaller change of height are level [m]
+LEVEL = 1e-9  # a path with a smaller change of height [m] counts as level
 
 
 def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None) -> Axes:
     """Tensions of all cables over time.
 
     Args:
-        plan: The plan; without a path, the abscissa is the index of the pose.
+        plan: The plan. Without a path, the abscissa is the index of the pose.
         quantity: One of "chord_tension", "horizontal_tension", "vertical_force", "frame_end_tension" and
             "platform_end_tension", as in `CableState` [N].
         ax: Axes to draw on; None for a new figure.
@@ -119,7 +119,7 @@ def overview(plan: Plan) -> Figure:
 
 
 def abscissa(plan: Plan) -> tuple[Array, str]:
-    """Times of a plan's path or numbers of its poses (N,), and the axis label; InvalidValueError without poses."""
+    """Times of a plan's path, or numbers of its poses, (N,), and the axis label. InvalidValueError without poses."""
     if not plan.status.size:
         raise InvalidValueError("plan", "a plan without poses", "at least one pose", "Plan some poses first.")
     return (np.arange(plan.status.size, dtype=np.float64), "pose") if plan.path is None else (plan.path.time, TIME)
@@ -132,14 +132,14 @@ def _values(plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> t
 
 
 def _format(ax: Axes, plan: Plan, label: str) -> None:
-    """Shade the infeasible poses; set the labels and limits of axes over time or over the numbers of poses."""
+    """Shade the infeasible poses. Set labels and limits of axes over time, or over the numbers of poses."""
     clock, axis = abscissa(plan)
     sheet.shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
     sheet.format_clock(ax, clock, label, axis)
 
 
 def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> None:
-    """Draw one line per cable; infeasible poses are shaded."""
+    """Draw one line per cable, and shade the infeasible poses."""
     values, label = _values(plan, quantity, table)
     clock, _ = abscissa(plan)
     sheet.draw_cables(ax, clock, values)
@@ -150,7 +150,7 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     """Position error along x, y and z over time: confirmed position minus planned position.
 
     Infeasible poses, and poses for which no stable equilibrium was found, are shaded. If the errors are too small to
-    see, the largest one is written as a number.
+    see, the largest error is written as a number.
 
     Args:
         confirmation: A confirmed plan.
@@ -183,7 +183,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         A figure with one panel per confirmation, with the robot as its title.
 
     Raises:
-        InvalidValueError: If no confirmation is given, or if an argument is not a confirmation.
+        InvalidValueError: If no confirmation is given. If an argument is not a confirmation.
 
     Examples:
         >>> import sagline as sl
@@ -204,7 +204,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
         sheet.hide_shared_labels(ax)
     for ax, confirmation in zip(panels, confirmations, strict=True):
-        _write_flat_error(ax, confirmation)  # the scale that all panels have
+        _write_flat_error(ax, confirmation)  # all panels have this scale
     figure_legend(figure, panels)
     return figure
 
@@ -231,10 +231,10 @@ def _write_flat_error(ax: Axes, confirmation: Confirmation) -> None:
 
 
 def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
-    """One quantity over time, with one panel per cable and equal scales; the other cables are gray in the background.
+    """One quantity over time in one panel per cable, with equal scales. In the background, all other cables are gray.
 
-    Such panels are easier to read than a single panel with many crossing lines, also in print without color. Dotted
-    lines are the robot's limits of this quantity, if they are in the range of the axis.
+    Several panels are easier to read than a single panel with many crossing lines, also in print without color. Dotted
+    lines are the robot's limits of the quantity; a limit outside the range of the axis is not drawn.
 
     Args:
         plan: The plan; without a path, the abscissa is the index of the pose.
@@ -283,7 +283,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
 
 
 def path(path: Path, ax: Axes | None = None) -> Axes:
-    """Top view of a path, with its start and direction; a new figure has a second panel with the height over time.
+    """Top view of a path with start and direction. In a new figure, a second panel shows the height over time.
 
     Args:
         path: The path.
@@ -311,7 +311,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
     ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=current().tick, loc="left")
     for k in _arrow_samples(path):
         base = path.pose.position[k, :2]
-        tip = base + 1e-3 * path.twist[k, :2]  # s: short enough to show the direction only
+        tip = base + 1e-3 * path.twist[k, :2]  # step [s], so short that the arrow shows only the direction
         arrow = {"arrowstyle": "-|>", "color": sheet.BLUE, "mutation_scale": 11.0}
         ax.annotate("", (tip[0], tip[1]), (base[0], base[1]), arrowprops=arrow)
     height = f"$z$ = {low:g} m" if high - low < LEVEL else f"$z$ from {low:g} m to {high:g} m"
@@ -344,7 +344,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 
 
 def _arrow_samples(path: Path) -> list[int]:
-    """Samples of the arrows, before the middle of each motion between two rests; of many motions, an even selection."""
+    """Samples for arrows, before the middle of each motion between two rests. Of many motions, an even selection."""
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
     moves = np.array(sheet.true_runs(speed > 1e-3 * speed.max(initial=0.0)), dtype=np.intp).reshape(-1, 2)
     chosen = moves[np.unique(np.linspace(0, len(moves) - 1, min(len(moves), MOST_ARROWS)).astype(np.intp))]

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 MARKERS = "osD^v<>phXP*"
-LARGEST, LEAST = 11.0, 4.0  # sizes of the first and of the last mark [pt]
+LARGEST, LEAST = 11.0, 4.0  # sizes of the first and of the last mark at a place [pt]
 SAME = 1e-6  # marks closer than this share of the polygon's extent count as equal
 CLOSE = 0.06  # marks closer than this share of the extent are also drawn in a second, enlarged panel
 AROUND = 1.6  # width of the enlarged part, relative to the extent of its marks
 SIZE, ENLARGED = 5.8, 2.6  # heights of the panels [in]
-LONGEST = 48  # letters per line of the names of equal marks
+LONGEST = 48  # largest number of letters per line for the names of equal marks
 POINT = 1.0 / 72.0  # [in]
-TRIES, SPARE = 5, 0.03  # largest number of iterations that enlarge the axes, and relative extra size of each
-SHORT = 1e-9  # sides shorter than this share of the longest side have no direction of their own
+TRIES, SPARE = 5, 0.03  # largest number of iterations that enlarge the axes, and relative enlargement per iteration
+SHORT = 1e-9  # a side that is shorter than this share of the longest side has no direction of its own
 GAP = 4.0  # distance between a side and its name [pt]
 
 
@@ -41,7 +41,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
     Args:
         shape: The polygon from `tension_polygon`, for two redundant cables.
-        points: Chord tensions (m,) by name; each is a mark in the polygon. Tensions with NaN have no mark. Equal
+        points: Chord tensions (m,) by name. Each becomes a mark in the polygon, except tensions with NaN. Equal
             tensions have a common mark with all their names. None: no marks.
         ax: Axes to draw on; None for a new figure.
 
@@ -49,7 +49,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         The axes.
 
     Raises:
-        InvalidValueError: If the polygon `shape` is empty, or if `points` are not tensions of its cables.
+        InvalidValueError: If the polygon `shape` is empty. If `points` are not tensions of its cables.
 
     Examples:
         >>> import sagline as sl
@@ -78,7 +78,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         _draw_places(panel, groups)
         format_axes(panel, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
         panel.set_aspect("equal")
-    panels[0].margins(x=0.33, y=0.16)  # space for names
+    panels[0].margins(x=0.33, y=0.16)  # space for the names
     if groups:
         name_lines(panels[0])
     _name_sides(panels[0], shape, corners)
@@ -92,7 +92,7 @@ def _panels(places: Sequence[Array], near: float) -> list[Axes]:
     several = len(cluster) > 1
     figure = sheet(SIZE + ENLARGED * several)
     if not several:
-        figure.set_layout_engine("compressed")  # axes with equal scales need it
+        figure.set_layout_engine("compressed")  # axes with equal scales need this setting
         return [figure.add_subplot()]
     panels: list[Axes] = list(figure.subplots(2, 1, height_ratios=(SIZE, ENLARGED)))
     low, high = (end(cluster, axis=0) for end in (np.min, np.max))
@@ -104,7 +104,7 @@ def _panels(places: Sequence[Array], near: float) -> list[Axes]:
 
 
 def _draw_places(ax: Axes, groups: Sequence[tuple[Array, list[str]]]) -> None:
-    """Draw empty marks, of decreasing size, so that equal ones are one inside the other."""
+    """Draw empty marks of decreasing size, so that marks at the same place are one inside the other."""
     for k, (place, names) in enumerate(groups):
         color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
         size = LARGEST - (LARGEST - LEAST) * k / max(len(groups) - 1, 1)
@@ -113,7 +113,7 @@ def _draw_places(ax: Axes, groups: Sequence[tuple[Array, list[str]]]) -> None:
 
 
 def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array, list[str]]]:
-    """Marks of `places` that are farther apart than `least`, each with the names of all marks that are closer to it."""
+    """Places that are farther apart than `least`. Each has the names of all `places` that are closer to it."""
     groups: list[tuple[Array, list[str]]] = []
     for name, place in places.items():
         if np.isfinite(place).all():
@@ -122,7 +122,7 @@ def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array
     return groups
 
 
-# name of a side: text, middle of the side [N], offset and half size of the name [pt]; True if it is moved outward
+# name of a side: text, middle of the side [N], offset and half size of the name [pt], True if moved outward
 _Name: TypeAlias = "tuple[str, Array, Array, Array, bool]"
 
 
@@ -156,7 +156,7 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
         text, middle = f"cable {side.cable} {side.limit}", 0.5 * (corners[k] + corners[(k + 1) % len(corners)])
         out = normals[k]
         half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=size).get_extents().width + 4.0, 1.3 * size])
-        away = least = GAP + half @ np.abs(out)  # distance at which the whole box of the name is outside of the line
+        away = least = GAP + half @ np.abs(out)  # at this distance, the whole box of the name is outside of the line
         while any(
             np.all(np.abs(scale * (middle - other) + away * out - place) < half + size_of_other + 1.0)
             for _, other, place, size_of_other, _ in names

@@ -34,20 +34,20 @@ if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
 
 POINTS = 50  # points around each pulley
-FLAT = 1e-6  # the shadow of a platform is a line if it is thinner than this share of the robot's size
+FLAT = 1e-6  # the shadow of a platform that is thinner than this share of the robot's size is a line
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-EDGES = tuple(  # the edges of a box are between corners that differ in a single coordinate
+EDGES = tuple(  # edges of a box: two corners that differ in a single coordinate
     (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
 )
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.5", "0.955", "0.82", "0.4"
-SAME_PLACE = 0.04  # anchors have a common label if they are closer than this share of the robot's size
+SAME_PLACE = 0.04  # anchors that are closer than this share of the robot's size have a common label
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 LABEL_DISTANCE = 0.045  # distance of a label outward from its anchor, as a share of the robot's size
 
 
 def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
-    """`pose`, or the middle of the robot's test box. InvalidValueError for a batch, or if both are missing."""
+    """`pose`, by default the middle of the robot's test box. InvalidValueError for a batch, or if both are missing."""
     if pose is not None:
         return single_pose(pose)
     if robot.test_box is None:
@@ -57,7 +57,7 @@ def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
 
 
 class Stroke(NamedTuple):
-    """A line of a figure of a robot, drawn over the lines with a smaller `order` where none of them is hidden."""
+    """A line in a figure of a robot. Visible parts of a line are drawn over lines with a smaller `order`."""
 
     points: Array  # in the world [m], shape (P, 3)
     color: Any
@@ -68,8 +68,8 @@ class Stroke(NamedTuple):
 
 
 def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], list[Stroke]]:
-    """Cables, and pulleys, drums, frame and platform of a robot at `pose`; cables have the colors of their tensions."""
-    # Cables without tensions are straight, dashed and gray.
+    """Lines of cables, pulleys, drums, frame and platform at `pose`. Cables have the colors of their tensions."""
+    # A cable without a tension is straight, dashed and gray.
     state = plan.state if plan is not None and plan.feasible else None
     tension = np.full(robot.cable_count, np.nan) if plan is None else plan.chord_tension
     colors = TensionScale.of(robot).colors(tension) / 255.0
@@ -84,22 +84,22 @@ def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], 
     for run, upright in zip(*shapes.dead_runs(robot), strict=True):
         if run[0, 2] != run[1, 2]:
             others.append(Stroke(run, WHEEL_COLOR, 0.7, "-" if upright else ":", 1.8))
-    frame, body = frame_box(robot), platform_box(robot, pose)
+    frame, body = _frame_box(robot), platform_box(robot, pose)
     if frame is not None:
         others += [Stroke(frame[[*edge]], FRAME_COLOR, 0.7, "-", 1.7, covers=True) for edge in EDGES]
     return cables, others + [Stroke(body[[*edge]], VERMILLION, 1.2, "-", 2.3) for edge in EDGES]
 
 
 def _rims(ends: Array, radius: float) -> Array:
-    """Both rims of a horizontal drum as one line; `ends` (2, 3) are the end points of the drum's axis."""
+    """Both rims of a horizontal drum as one line. `ends` (2, 3): end points of the drum's axis."""
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
     return np.concatenate((ends[0] + rim, ends[1] + rim))
 
 
-def frame_box(robot: Robot) -> Array | None:
-    """Corners of the frame, shape (8, 3); the top of the frame is at the height of the highest anchor."""
+def _frame_box(robot: Robot) -> Array | None:
+    """Corners of the frame, shape (8, 3). The top of the frame is at the height of the highest anchor."""
     if robot.frame_size is None:
         return None
     top = robot.frame_anchors.max(axis=0)
@@ -123,7 +123,7 @@ def _box_corners(middle: Array, size: Array) -> Array:
 
 
 def ground(points: Array, platform: Array) -> tuple[Array, Array]:
-    """Corners (k, 3) of the ground, at z = 0 or below the lowest point, and of the platform's shadow on the ground."""
+    """Corners (k, 3) of the ground (at z = 0 or below the lowest point), and of the platform's shadow on it."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = min(0.0, float(low[2]))
     outline = _box_corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
@@ -138,9 +138,9 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
     """The robot in space at rest: frame, platform, and its cables as exact catenaries.
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
-    numbers at the frame. Pulleys are turned into the planes of their cables. Between drum and pulley, a cable is a
-    vertical line from one height to the other, dotted if its length is different. The ground with the platform's shadow
-    is at z = 0 or lower.
+    numbers at the frame. Pulleys are turned into the planes of their cables. Between drum and pulley, a cable is drawn
+    as a vertical line from one height to the other. The line is dotted if the true length differs. The ground with the
+    platform's shadow is at z = 0 or lower.
 
     Args:
         robot: The robot.
@@ -152,7 +152,7 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
         The axes.
 
     Raises:
-        InvalidValueError: If no pose is given and the robot has no test box, or the pose is a batch.
+        InvalidValueError: If no pose is given and the robot has no test box. If the pose is a batch.
 
     Examples:
         >>> import sagline as sl
@@ -164,9 +164,7 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
         ax = sheet(height=4.0).add_subplot(projection="3d")
     plan, points = draw_robot(ax, robot, where)
     format_space_axes(
-        ax,
-        points,
-        robot.name if plan.feasible else f"{robot.name}: no tensions within the limits balance this pose",
+        ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits balance this pose"
     )
     if plan.feasible:
         tension_bar(ax, TensionScale.of(robot), plan.chord_tension, "left")
@@ -174,8 +172,8 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
 
 
 def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) -> tuple[Plan, Array]:
-    """Draw frame, platform, cables and ground; the axes have no labels yet."""
-    ax.computed_zorder = False  # matplotlib's order by centers would draw the floor over objects on it
+    """Draw frame, platform, cables and ground on axes that have no labels yet."""
+    ax.computed_zorder = False  # matplotlib sorts objects by their centers, and would draw the floor over objects on it
     plan = inverse(robot, where)
     cables, others = strokes(robot, where, plan)
     if color is not None:
@@ -191,7 +189,7 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
 
 
 def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
-    """Write each cable's number above and outside its anchor; anchors that are close have a common label."""
+    """Write each cable's number above and outside its anchor. Anchors that are close have a common label."""
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     left = list(range(len(anchors)))
     while left:
@@ -199,7 +197,7 @@ def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
         left = [k for k in left if k not in together]
         place = anchors[together].mean(axis=0)
         out = (place - points.mean(axis=0)) * (1.0, 1.0, 0.0)
-        out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward, because the axes have numbers below
+        out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have numbers below
         place = place + LABEL_DISTANCE * size * out
         text = ", ".join(map(str, together))
         ax.text(*place, text, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=5.0)
@@ -215,13 +213,13 @@ def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["l
     bar = color_bar(shown, ax, r"chord tension $\tau$ [N]", **look)
     if bar.solids is not None:
         bar.solids.set_rasterized(False)
-        bar.solids.set_edgecolor("face")  # no white seams
+        bar.solids.set_edgecolor("face")  # this avoids white lines between the colors
     bar.set_ticks(list(scale.ticks()), labels=[n(tick, ",.4g") for tick in scale.ticks()])
     bar.ax.minorticks_off()
 
 
 def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
-    """Limit `ax` to a box whose sides are at least a tenth of its longest side; returns the lengths of the sides."""
+    """Limit `ax` to a box with sides of at least a tenth of the longest side. Returns the lengths of the sides."""
     size: Array = np.maximum(high - low, 0.1 * np.max(high - low))
     middle = 0.5 * (low + high)
     ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
@@ -229,7 +227,7 @@ def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
 
 
 def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
-    """Write labels, and set ticks so that their numbers do not overlap. There is no tick where two axes meet."""
+    """Write labels, and set ticks so that their numbers do not overlap. The points where two axes meet have no tick."""
     ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(0.0, low[2])

@@ -13,7 +13,7 @@ from sagline.core.arguments import instance
 from sagline.core.numbers import ROUNDING, n, prefixed_unit
 from sagline.dynamics.simulation.results import Simulation
 from sagline.plot import sheet
-from sagline.plot.labels import figure_legend, legend_above, name_lines, wrap_heading
+from sagline.plot.labels import figure_legend, legend_above, name_lines, wrap_heading, write_beside
 from sagline.plot.style import current
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 PER_METER: Final = 1e3  # [mm]
-SHOWN: Final = 0.5  # the limit is drawn if the largest tension exceeds this share of it
+SHOWN: Final = 0.5  # the tension limit is drawn if the largest tension exceeds this share of the limit
 AT_REST = 1e-7  # smallest range of the energy axis, as a share of the potential energy
 STATES: Final = {  # states that have a color of their own
     State.HOMING: sheet.ORANGE, State.MOVING: sheet.BLUE, State.JOGGING: sheet.SKY, State.PAUSING: sheet.GREEN,
@@ -64,14 +64,14 @@ def simulation(simulation: Simulation) -> Figure:
         _mark_events(ax, simulation, named=ax is above)
         if ax is not above:
             name_lines(ax)
-    figure_legend(figure, [above])  # above the names of the events
+    figure_legend(figure, [above])  # the title is above the names of the events
     return figure
 
 
 def energy(simulation: Simulation) -> Figure:
-    """Kinetic and potential energy, supplied work and lost energy over time; below, the error of the energy balance.
+    """Energies over time: kinetic, potential, supplied and lost. A lower panel shows the error of the energy balance.
 
-    The potential energy is drawn minus its initial value.
+    The curve of the potential energy is the change from the initial value.
 
     Args:
         simulation: The simulation.
@@ -114,10 +114,16 @@ def energy(simulation: Simulation) -> Figure:
     return figure
 
 
+def _mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> None:
+    """Draw a vertical line at `time`, with `name` (if not "") above the axes."""
+    ax.axvline(time, color=color, linewidth=1.0, zorder=zorder)
+    if name:
+        write_beside(ax, name, (time, 1.0), (0.0, 2.0), va="bottom", xycoords=("data", "axes fraction"))
+
+
 def _mark_events(ax: Axes, simulation: Simulation, *, named: bool) -> None:
     for event in simulation.events:
-        name = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
-        sheet.mark_event(ax, event.time, name if named else "", sheet.GAP_COLOR, 1.0)
+        _mark_event(ax, event.time, event.text if named else "", sheet.GAP_COLOR, 1.0)
 
 
 def _largest(*courses: Array) -> float:
@@ -125,11 +131,11 @@ def _largest(*courses: Array) -> float:
 
 
 def execution(done: Execution) -> Figure:
-    """Overview of an execution: states, tensions, their error, and the estimated position of the platform.
+    """Overview of an execution: states, tensions, tension errors, and position error of the platform.
 
-    The panels are, from top to bottom: the states, with a line at each fault; the measured and the planned tensions
-    (dashed); the part of the tension error that lengths can correct while the platform stays at rest, filtered as in
-    the tension loop; and the estimated minus the planned position.
+    The panels show, from top to bottom: the states, with a line at each fault; the measured tensions and the planned
+    tensions (dashed); the part of the tension errors that changes of length can correct without moving the platform,
+    filtered as in the tension loop; and the estimated minus the planned position.
 
     Args:
         done: The execution.
@@ -156,7 +162,7 @@ def execution(done: Execution) -> Figure:
             panel.tick_params(labelbottom=False)
         _mark_faults(panel, done)
     own: Any = parts[0].get_legend()
-    own.remove()  # the names of the faults are written at the place of the label
+    own.remove()  # the names of the faults are at the place of the label
     figure_legend(figure, parts[:1])
     return figure
 
@@ -222,14 +228,14 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
 
 
 def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
-    """Part of the tension errors that lengths can correct with the platform at rest, filtered as in the tension loop.
+    """Part of the tension errors that changes of length can correct without moving the platform, filtered.
 
     Args:
         done: The execution.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
-        The axes; empty for a robot without redundancy.
+        The axes, empty for a robot without redundancy.
 
     Examples:
         >>> import sagline as sl
@@ -270,15 +276,15 @@ def _clock(done: Execution) -> Array:
 
 
 def _finished(ax: Axes, clock: Array, label: str) -> Axes:
-    """Set the labels and limits of the axes, and write the names of the lines."""
+    """Finish the axes: labels, limits, and the names of the lines."""
     sheet.format_clock(ax, clock, label)
     name_lines(ax)
     return ax
 
 
 def _mark_faults(ax: Axes, done: Execution) -> None:
-    """Draw a line at each fault; the fault's name is above the panel of the states."""
+    """Draw a line at each fault. The name of the fault is above the panel of the states."""
     for event in done.events:
         if event.kind is EventKind.FAULT and len(done):
             name = "" if ax.get_yticks().size else event.name
-            sheet.mark_event(ax, float(event.time - done.time[0]), name, sheet.VERMILLION, 4.0)
+            _mark_event(ax, float(event.time - done.time[0]), name, sheet.VERMILLION, 4.0)

@@ -23,7 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from sagline.core.arguments import brief, file_path, optional
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import atomic_file
-from sagline.plot.labels import PLACE, TIME, break_labels, write_beside
+from sagline.plot.labels import PLACE, TIME
 from sagline.plot.style import PLAIN, SANS, SERIF, Using, current
 
 if TYPE_CHECKING:
@@ -35,14 +35,14 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array, Flags
 
-# Okabe and Ito 2008, "Color universal design", without the two colors that are too pale for lines on white
+# Okabe and Ito 2008, "Color universal design"; two colors that are too pale for lines on white are left out
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 GAP_COLOR = "#BBBBBB"
 DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
 LINE_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
 MAP_COLORS: Final = "cividis"  # a color map that is readable with all kinds of color vision
-MOST_POINTS: Final = 4000  # largest number of points of a line; of more points, the extrema of parts are drawn
+MOST_POINTS: Final = 4000  # largest number of points of a line; of a longer line, extrema of its parts are drawn
 LABEL, TICK = PLAIN.label, PLAIN.tick  # text sizes in the documentation [pt]
 RESOLUTION = 300  # dots per inch
 
@@ -51,27 +51,27 @@ _reference = re.compile(r'(href="#|url\(#)([^")]+)')
 _name = re.compile(r' id="([^"]+)"')
 SVG = "{http://www.w3.org/2000/svg}"
 FAMILY = re.compile(r"font-family:\s*([^;]+)")
-OWN = frozenset({SANS, SERIF})  # fonts that come with Matplotlib; their licenses allow embedding in documents
+OWN = frozenset({SANS, SERIF})  # fonts that come with Matplotlib and may be embedded in documents by their licenses
 _Face = tuple[str, str, str]  # family, style and weight
 
 
 class Sheet(Figure):
-    """A figure without pyplot, which a notebook can show; the figure keeps the style in which it was created."""
+    """A figure without pyplot that a notebook can show, and that keeps the style in which it was created."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
-        """Create a figure; the arguments are those of Matplotlib."""
+        """Create a figure. The arguments are the same as for a figure of Matplotlib."""
         super().__init__(*arguments, **named)
         self.style = current()
         self._fitted = False
 
     def draw(self, renderer: Any) -> None:
-        """Draw in the style of the figure. Objects that Matplotlib makes while it draws then also have this style."""
+        """Draw in the style of the figure. Objects that Matplotlib creates while drawing thus also have this style."""
         with Using(self.style):
             if not self._fitted:
                 self._fitted = True  # the figure has not been drawn yet
                 _thicken(self, self.style.line)
                 self.draw_without_rendering()  # the layout determines the length of the axes
-                break_labels(self)
+                _break_labels(self)
             super().draw(renderer)
 
     def savefig(self, *arguments: Any, **named: Any) -> None:
@@ -90,8 +90,20 @@ def sheet(height: float) -> Sheet:
     return Sheet(figsize=current().size(height), layout="constrained")
 
 
+def _break_labels(figure: Figure) -> None:
+    """Break vertical axis labels into two lines if they are longer than their axes."""
+    for ax in figure.axes:
+        words = ax.yaxis.get_label_text().split(" ")
+        length, height = ax.yaxis.label.get_window_extent().height, ax.bbox.height
+        if length > height and len(words) > 2 and "\n" not in ax.yaxis.get_label_text():
+            lines = [(" ".join(words[:k]), " ".join(words[k:])) for k in range(1, len(words))]
+            whole = [pair for pair in lines if all(line.count("$") % 2 == 0 for line in pair)]  # no broken formulas
+            if whole:
+                ax.yaxis.label.set_text("\n".join(min(whole, key=lambda pair: max(map(len, pair)))))
+
+
 def _thicken(figure: Figure, factor: float) -> None:
-    """Multiply line widths and marker sizes by a factor; frames and ticks do not change."""
+    """Multiply line widths and marker sizes by `factor`. Frames and ticks do not change."""
     owners: list[Any] = [*figure.axes, *figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]
     for line in (line for owner in owners for line in owner.get_lines()):
         line.set_linewidth(factor * line.get_linewidth())
@@ -103,7 +115,7 @@ def _thicken(figure: Figure, factor: float) -> None:
 
 
 def axes_or_new(ax: Axes | None, height: float = 3.0) -> Axes:
-    """The Axes `ax`, or the Axes of a new figure. InvalidValueError for other objects and for 3D axes."""
+    """The Axes `ax`, or the Axes of a new figure if None. InvalidValueError for other objects and for 3D axes."""
     optional(ax, Axes, "ax")
     if ax is None:
         return sheet(height).add_subplot()
@@ -134,7 +146,7 @@ def format_clock(ax: Axes, clock: Array, label: str, axis: str = TIME) -> None:
 
 
 def hide_shared_labels(ax: Axes) -> None:
-    """Hide repeated numbers and labels in a grid of axes: at the left if y is shared, below if x is shared."""
+    """Hide repeated numbers and labels in a grid of axes: on the left if they share y, below if they share x."""
     place: Any = ax.get_subplotspec()
     if ax.get_shared_x_axes().get_siblings(ax) != [ax] and not place.is_last_row():
         ax.tick_params(axis="x", which="both", labelbottom=False)
@@ -145,7 +157,7 @@ def hide_shared_labels(ax: Axes) -> None:
 
 
 def draw_map(ax: Axes, x: Array, y: Array, values: Array, scale: Normalize, title: str) -> None:
-    """Draw values (nx, ny) at the points of a level grid as colors; cells without a value are white and hatched."""
+    """Draw values (nx, ny) at the points of a level grid as colors. Cells without a value are white and hatched."""
     ax.patch.set(facecolor="white", hatch="////", edgecolor="0.6")
     edges = _cell_edges(x), _cell_edges(y)
     ax.pcolormesh(*edges, np.ma.masked_invalid(values.T), norm=scale, cmap=MAP_COLORS, rasterized=True)
@@ -173,20 +185,13 @@ def color_bar(shown: ScalarMappable, axes: Any, label: str, **look: Any) -> Colo
     return bar
 
 
-def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> None:
-    """Draw a vertical line at `time`, with `name` above the axes; no name for ""."""
-    ax.axvline(time, color=color, linewidth=1.0, zorder=zorder)
-    if name:
-        write_beside(ax, name, (time, 1.0), (0.0, 2.0), va="bottom", xycoords=("data", "axes fraction"))
-
-
 def cable_look(cable: int) -> dict[str, Any]:
-    """Color and line style of a cable; two neighbors have equal colors, because most robots have pairs of winches."""
+    """Color and line style of a cable. Two neighbors have equal colors, because most robots have pairs of winches."""
     return {"color": COLORS[cable // 2 % len(COLORS)], "linestyle": "-" if cable % 2 == 0 else DASHED}
 
 
 def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
-    """Draw a line over time; a sample is a point if its neighbors are missing."""
+    """Draw a line over time. A sample without neighbors is drawn as a point."""
     if clock.size > MOST_POINTS:
         few = 2 * -(-clock.size // MOST_POINTS)
         rows = np.arange(clock.size // few * few).reshape(-1, few)
@@ -203,19 +208,19 @@ def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
 
 
 def draw_cables(ax: Axes, clock: Array, values: Array, linewidth: float = 1.1) -> None:
-    """Draw one line over time for each cable; `values` (N, m)."""
+    """Draw one line over time for each cable. `values`: (N, m)."""
     for i, course in enumerate(values.T):
         draw_series(ax, clock, course, **cable_look(i), linewidth=linewidth, label=f"cable {i}")
 
 
 def draw_components(ax: Axes, clock: Array, courses: Array, name: str = "{}") -> None:
-    """Draw the components (N, 3) along x, y and z over time; `name` formats the symbol of each component."""
+    """Draw the components (N, 3) along x, y and z over time. `name` formats the symbol of each component."""
     for axis, course, color, style in zip("xyz", courses.T, COLORS, LINE_STYLES, strict=False):
         draw_series(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name.format(axis)}$")
 
 
 def true_runs(flags: Flags) -> list[tuple[int, int]]:
-    """First and last sample of each sequence in which the flag is True."""
+    """First and last index of each sequence of True in `flags`."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
@@ -235,7 +240,7 @@ def shade_spans(
 
 
 def svg_text(figure: Figure, dots: int, **settings: str) -> str:
-    """A figure as an SVG element for a page. Date and creator are left out, so that each call gives the same text."""
+    """The figure as an SVG element for a page. Without date and creator, so that each call gives the same text."""
     written = BytesIO()
     with matplotlib.rc_context(cast(Any, settings)):
         figure.savefig(written, format="svg", dpi=dots, metadata={"Date": None, "Creator": None}, transparent=True)
@@ -244,7 +249,7 @@ def svg_text(figure: Figure, dots: int, **settings: str) -> str:
 
 
 def unique_names(svg: str, prefix: str) -> str:
-    """`svg` with identifiers that begin with `prefix`, for several drawings in a page. Others are removed."""
+    """`svg` whose identifiers begin with `prefix`, for pages with several drawings. Unused identifiers are removed."""
     used = {found[1] for found in _reference.findall(svg)}
     svg = _name.sub(lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", svg)
     return _reference.sub(lambda found: f"{found[1]}{prefix}{found[2]}", svg)
@@ -254,12 +259,12 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     """Write a figure to a file atomically; the suffix (.png, .svg, .pdf) selects the format.
 
     Args:
-        drawing: A figure, or Axes, whose whole figure is saved.
+        drawing: A figure, or Axes of a figure, which is saved as a whole.
         file: The file; an existing file is replaced.
 
     Raises:
         InvalidValueError: If `drawing` is not a figure or Axes.
-        FileError: If the file cannot be written, or its suffix is unknown to matplotlib.
+        FileError: If the file cannot be written. If matplotlib does not support the suffix of the file.
 
     Examples:
         >>> import sagline as sl
@@ -270,10 +275,10 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
     path = file_path(file)
     kind = path.suffix.lstrip(".").lower()
-    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # .pgf is left out, because it needs LaTeX
+    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # .pgf would need LaTeX
     if kind not in known:
         raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(known)}.")
-    # no date and no random names, so that equal figures give equal bytes
+    # without date and random names, equal figures give equal bytes
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     drawn = BytesIO()  # matplotlib would leave a file open after a write error
     with matplotlib.rc_context({"svg.hashsalt": "sagline"}):
@@ -286,7 +291,7 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
 
 
 def _with_fonts(svg: str) -> str:
-    """Embed the fonts of a drawing; each font has only the letters that the drawing uses."""
+    """Embed the fonts of a drawing. Each font contains only the letters that the drawing uses."""
     letters = _letters(svg)
     faces = [_face(face, "".join(sorted(used))) for face, used in sorted(letters.items()) if used]
     if not faces:
@@ -319,12 +324,12 @@ def _last(style: str, name: str, default: str) -> str:
 
 
 def _face(face: _Face, letters: str) -> str:
-    """A rule of a style sheet that contains the letters of a font."""
+    """Style sheet rule that contains `letters` of a font."""
     family, style, weight = face
     properties = FontProperties(family=[family], weight=int(weight) if weight.isdigit() else weight)
     properties.set_style(cast(Literal["normal", "italic", "oblique"], style))
     options = subset.Options(notdef_outline=True)
-    options.drop_tables += ["FFTM"]  # the table of time stamps cannot be reduced
+    options.drop_tables += ["FFTM"]  # the font's table of time stamps cannot be reduced
     with TTFont(fontManager.findfont(properties), recalcTimestamp=False) as font:
         subsetter = subset.Subsetter(options)
         subsetter.populate(text=letters)

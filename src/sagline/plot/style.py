@@ -11,7 +11,7 @@ import matplotlib
 
 from sagline.core.arguments import choice, whole_number
 
-SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # fonts of Matplotlib, so on any computer; the second resembles Times
+SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # fonts of Matplotlib, on any computer; the second resembles Times
 SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # largest heights of a figure [in]
 
 
@@ -22,13 +22,13 @@ class Style:
     Attributes:
         name: Name of the style; "" for the style of the documentation.
         width: Width of every figure [in].
-        height: Factor of the heights of figures; it is 1 in the documentation.
+        height: Factor by which heights of figures are multiplied; 1 in the documentation.
         tallest: Largest height of a figure [in].
         font: Font family of all text.
         mathematics: Matplotlib's name for the font of formulas.
         label: Font size of axis labels, titles and labels of bars [pt].
         tick: Font size of numbers and of the names of lines [pt].
-        line: Factor of line widths and marker sizes; it is 1 in the documentation.
+        line: Factor by which line widths and marker sizes are multiplied; 1 in the documentation.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Style:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Matplotlib's settings: text stays text in files, and fonts are embedded."""
+        """Settings for Matplotlib. Text is stored as text in files, and fonts are embedded."""
         if not self.name:
             return {}
         sizes = dict.fromkeys(("axes.labelsize", "axes.titlesize", "figure.titlesize"), self.label)
@@ -70,12 +70,12 @@ class Style:
         }
 
 
-# text has at least 6 pt if the figure is only 8 cm wide, on a phone or in a column
+# text has at least 6 pt even if the figure is only 8 cm wide, on a phone or in a column
 PLAIN: Final = Style("", 4.7, 0.85, PAGE_HEIGHT, SANS, "dejavusans", 10.0, 9.0, 1.0)
 _IEEE = Style("ieee", 3.5, 0.75, PAGE_HEIGHT, SERIF, "stix", 9.0, 8.0, 1.0)
 _MDPI = Style("mdpi", 5.45, 0.85, PAGE_HEIGHT, SERIF, "stix", 10.0, 9.0, 1.0)
 _SLIDES = Style("slides", 6.0, 1.5, SLIDE_HEIGHT, SANS, "dejavusans", 16.0, 14.0, 1.8)
-STYLES: Final = {  # by name: the styles for one column and for two columns
+STYLES: Final = {  # for each name, the styles for one column and for two columns
     # IEEE Author Center, "Size requirements for graphics": 3.5 in and 7.16 in
     "ieee": (_IEEE, replace(_IEEE, width=7.16, height=0.9)),
     # mdpi.cls: the text is 394.36 pt wide, or 525.5 pt with the margin next to it; an inch has 72.27 pt
@@ -87,12 +87,12 @@ _current: ContextVar[Style] = ContextVar("style", default=PLAIN)
 
 
 def current() -> Style:
-    """Current style, which new figures have."""
+    """Current style. New figures have this style."""
     return _current.get()
 
 
 def style(name: str, columns: int = 1) -> Using:
-    """Style of figures for a journal or a slide; figures that are created inside its `with` statement keep it.
+    """Style of figures for a journal or a slide. Figures created inside its `with` statement keep this style.
 
     Figures have the width of the column, fonts of Matplotlib (available on any computer), and text sizes for print at
     this width. Names are at the ends of lines if there is space. Inside the block, figures that are created directly
@@ -107,7 +107,7 @@ def style(name: str, columns: int = 1) -> Using:
         Context manager for a `with` statement, which can also be used as a decorator. Its value is the `Style`.
 
     Raises:
-        InvalidValueError: If the style does not exist, or `columns` is not 1 or 2.
+        InvalidValueError: If the style does not exist. If `columns` is not 1 or 2.
 
     Examples:
         >>> import sagline as sl
@@ -120,7 +120,7 @@ def style(name: str, columns: int = 1) -> Using:
 
 
 class Using(ContextDecorator):
-    """Context manager of a style; it can be used repeatedly and nested."""
+    """Context manager of a style, which can be used repeatedly and nested."""
 
     def __init__(self, chosen: Style) -> None:
         """Store the style, which the `with` statement activates."""

@@ -1,4 +1,4 @@
-"""Plots of a workspace: a slice with its boundary, margins and limiting cables; the hull around the robot."""
+"""Plots of a workspace: a slice with boundary, margins and limiting cables, and the hull around the robot."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
+from sagline.kinematics.inverse import inverse
 from sagline.plot.geometry import Find, cut_at_limits
 from sagline.plot.labels import PLACE, set_heading
 from sagline.plot.robot import draw_robot, format_space_axes
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.viewer.tension_scale import CABLES, cable_color
 from sagline.workspaces.levels import Plane, Slice, slice_of
 from sagline.workspaces.region import AXES, flat_axis
-from sagline.workspaces.workspace import BY_BOX, Workspace, amount_of
+from sagline.workspaces.workspace import BY_BOX, Workspace, amount_of, orientations_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,18 +41,18 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array, Flags, Indices
 
 POINTS: Final = 200  # number of grid points along the longer side
-LINES: Final = 5  # largest number of contour lines of the margin, approximately
-ROOM: Final = 11.0  # a region has no name if its largest width is below twice this length [pt]
+LINES: Final = 5  # approximate number of contour lines of the margin
+ROOM: Final = 11.0  # smallest half width of a region with a name [pt]
 OUTSIDE: Final = to_rgba(GAP_COLOR, 0.35)
-BESIDE: Final = 1e-6  # offset of the slice from a plane of symmetry, as a share of the distance to the end of the box
-PALE: Final = 0.45  # share of the limit's color in the color of its region; the rest is white
+BESIDE: Final = 1e-6  # offset of a slice in a plane of symmetry, as a share of the distance to the end of the box
+PALE: Final = 0.45  # share of a limit's color in the color of its region, which is mixed with white
 Key = tuple[int, int]  # a limit: index of the criterion, and cable
 Color = tuple[float, float, float]
 HALO: Final = [patheffects.withStroke(linewidth=2.2, foreground="white")]
 NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull in front of and behind the robot
-FINEST: Final = 90  # number of cells along the longest side of the drawn hull; more would be slow and not visible
+FINEST: Final = 90  # number of cells along the longest side of the drawn hull; more cells would be slow and not visible
 HEIGHT = 3.4  # [in]
-WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # axes' places in the sheet
+WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # places in the sheet
 ABOVE, BELOW = (-0.05, 0.42, 1.05, 0.52), (0.2, 0.1, 0.75, 0.3)  # position of the axes in a narrow sheet
 MOST_LIMITS: Final = 10  # largest number of limits that have their own bar
 REST: Final = "others"
@@ -59,12 +61,12 @@ REST: Final = "others"
 def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes | None = None) -> Axes:
     """A slice through a workspace, perpendicular to a world axis.
 
-    The bold line is the boundary of the workspace, computed with its criteria at the resolution of the slice. Inside,
-    thin lines are contours of the margin [N]. Colors show which limit is reached first: the cable that limits the
-    margin, or another criterion.
+    The bold line is the boundary of the workspace, computed from the criteria at the resolution of the slice.
+    Inside, thin lines are contours of the margin [N]. Colors show which limit is reached first: the cable that limits
+    the margin, or another criterion.
 
     Args:
-        space: The workspace, whose robot, loads, orientations and criteria the slice has.
+        space: The workspace. Its robot, loads, orientations and criteria also apply to the slice.
         normal: Axis perpendicular to the slice: "x", "y" or "z".
         at: Coordinate on this axis [m]; None for the middle of the workspace.
         ax: Axes to draw on; None for a new figure.
@@ -73,7 +75,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
         The axes.
 
     Raises:
-        InvalidValueError: If the slice is outside of the workspace's box, or `normal` is not the normal of a flat box.
+        InvalidValueError: If the slice is outside of the workspace's box. If `normal` is not the normal of a flat box.
 
     Examples:
         >>> import sagline as sl
@@ -88,7 +90,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     size = high - low
     longest = max(size[first], size[second])
     shape = tuple(max(2, round(POINTS * float(size[axis] / longest))) for axis in plane.axes)
-    # in a plane of symmetry, rounding errors would select one of two cables; therefore a parallel plane is drawn
+    # in a plane of symmetry, rounding errors would select one of two cables, so that a parallel plane is drawn
     beside = plane._replace(at=plane.at + BESIDE * float(high[plane.normal] - plane.at))
     cut = slice_of(space.levels().details, beside, low, high, (shape[0], shape[1]))
     ax = axes_or_new(ax, height=0.9 + 5.6 * float(np.clip(size[second] / size[first], 0.3, 1.3)))
@@ -100,15 +102,15 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
         ax.set_facecolor(OUTSIDE)
         ax.text(0.5, 0.5, "outside the workspace", transform=ax.transAxes, ha="center", fontsize=current().label)
     else:
-        levels = round_levels(float(cut.margin[(cut.level >= 0.0) & np.isfinite(cut.margin)].max(initial=0.0)))
+        levels = _round_levels(float(cut.margin[(cut.level >= 0.0) & np.isfinite(cut.margin)].max(initial=0.0)))
         _draw_regions(ax, cut, space, levels, _draw_lines(ax, cut, levels))
     place = f"{AXES[plane.normal]} = {n(plane.at, unit='m')}"
-    set_heading(ax, f"{space.robot.name}, {place}; {space.wrenches}; {space.orientations}")
+    set_heading(ax, f"{space.robot.name}, {place}; {space.wrenches}; {orientations_text(space)}")
     return ax
 
 
 def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
-    """The plane of a slice. InvalidValueError if the plane is not in the box of the workspace."""
+    """The plane of a slice. InvalidValueError if the plane is outside the box of the workspace."""
     axis = AXES.index(choice(normal, "normal", AXES))
     low, high = float(space.box.low[axis]), float(space.box.high[axis])
     flat = flat_axis(space.box)
@@ -126,22 +128,22 @@ def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
 
 
 def _limit_name(key: Key, space: Workspace) -> str:
-    """Name of the limit `key`. If the limit is the margin, it is the name of the cable."""
+    """Name of the limit `key`: a criterion, or the limiting cable if the criterion is the margin."""
     which, cable = key
     named = [space.criteria[which].title] if which > 0 or cable < 0 else []
     return ", ".join(named + [f"cable {cable}"] * (cable >= 0))
 
 
-def limit_colors(space: Workspace) -> dict[Key, Color]:
-    """Colors of all possible limits; a limit has the same color in all figures of a workspace."""
+def _limit_colors(space: Workspace) -> dict[Key, Color]:
+    """Colors of all possible limits. A limit has the same color in all figures of a workspace."""
     count = space.robot.cable_count
     colors = {(0, cable): _shade(cable_color(cable)) for cable in range(-1, count)}
     others = [(which, cable) for which in range(1, len(space.criteria)) for cable in range(-1, count)]
     return colors | {key: _shade(CABLES[-1 - k % len(CABLES)]) for k, key in enumerate(others)}
 
 
-def limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
-    """Function of positions (N, 3) [m] that gives the index of each position's limit in `keys`."""
+def _limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
+    """Function of positions (N, 3) [m] that gives the index in `keys` of the limit at each position."""
     details, index = space.levels().details, {key: k for k, key in enumerate(keys)}
 
     def find(positions: Array) -> Indices:
@@ -152,22 +154,22 @@ def limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
 
 
 def _shade(color: tuple[int, int, int]) -> Color:
-    """Color in the form of matplotlib."""
+    """Color as three numbers, in the form of matplotlib."""
     red, green, blue = color
     return red / 255.0, green / 255.0, blue / 255.0
 
 
 def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers: Sequence[Text]) -> None:
-    """Fill the region of each limit with a pale color, and write the limit's name beside `numbers`. Gray outside."""
+    """Fill the region of each limit with a pale color, and write its name, but not over `numbers`. Outside is gray."""
     ax.set_facecolor(OUTSIDE)
     inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
-    shades, codes = limit_colors(space), np.stack((cut.criterion, cut.cable), axis=-1)
+    shades, codes = _limit_colors(space), np.stack((cut.criterion, cut.cable), axis=-1)
     keys = list(shades)
     region = np.array([keys.index((int(which), int(cable))) for which, cable in codes.reshape(-1, 2)])
     colors = PALE * np.array(list(shades.values())) + 1.0 - PALE
     region = region.reshape(cut.level.shape)
     image = ax.pcolormesh(cut.across, cut.up, colors[region], shading="nearest", rasterized=True, zorder=0.9)
-    corners, own = _triangles_at_borders(cut, region, limit_finder(space, keys))
+    corners, own = _triangles_at_borders(cut, region, _limit_finder(space, keys))
     borders = PolyCollection(
         list(corners), facecolors=colors[own], edgecolors="none", antialiased=False, rasterized=True, zorder=0.91
     )
@@ -184,7 +186,7 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers
 
 
 def _triangles_at_borders(cut: Slice, region: Indices, find: Find) -> tuple[Array, Indices]:
-    """Triangles (U, 3, 2) of cells with several limits, divided where the limit changes; the triangles' limits (U,)."""
+    """Triangles (U, 3, 2) of cells with several limits, divided where the limit changes, and their limits (U,)."""
     rows, columns = region.shape
     place = np.arange(region.size).reshape(rows, columns)
     cells = np.stack((place[:-1, :-1], place[:-1, 1:], place[1:, 1:], place[1:, :-1]), axis=-1).reshape(-1, 4)
@@ -213,7 +215,7 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
 def _name_region(
     ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, boxes: Sequence[BboxBase]
 ) -> list[BboxBase]:
-    """Write `name` in the middle of each large part of a region, over no other text; returns the boxes of the names."""
+    """Write `name` in the middle of each large part of a region, without overlap. Returns the boxes of the names."""
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
     points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size
@@ -243,7 +245,7 @@ def _name_region(
 
 
 def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
-    """Draw the boundary, and contour lines of the margin inside; returns the numbers at the contour lines."""
+    """Draw the boundary, and inside it contour lines of the margin. Returns the numbers at the contour lines."""
     numbers: Sequence[Text] = ()
     if levels.size:
         margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
@@ -256,8 +258,8 @@ def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
     return numbers
 
 
-def round_levels(largest: float) -> Array:
-    """About `LINES` round values of the margin, from 0 (excluded) to the largest margin."""
+def _round_levels(largest: float) -> Array:
+    """About `LINES` round values of the margin, above 0 and up to the largest margin."""
     if not np.isfinite(largest) or largest <= 0.0:
         return np.empty(0)
     coarse = largest / LINES
@@ -270,7 +272,7 @@ def workspace(space: Workspace) -> Figure:
     """The hull of a workspace around its robot, and its limits.
 
     The color of a face shows its limit: the cable that limits the margin, or another criterion. Faces on the box of the
-    workspace are gray. The bars show each limit's share of the surface. A workspace in a plane is drawn as a slice.
+    workspace are gray. Bars show the share of each limit. A plane workspace is drawn as a slice.
 
     Args:
         space: The workspace.
@@ -293,9 +295,9 @@ def workspace(space: Workspace) -> Figure:
         return slice(space, AXES[flat[0]]).get_figure(root=True)  # type: ignore[return-value] # a new figure
     limits, narrow = space.limits, current().narrow
     figure = sheet(height=2.3 * HEIGHT if limits and narrow else HEIGHT)
-    figure.set_layout_engine("none")  # Matplotlib's layout does not include the extent of 3D axes
+    figure.set_layout_engine("none")  # the layout of Matplotlib does not include the extent of 3D axes
     ax: Any = figure.add_axes((ABOVE if narrow else ROBOT) if limits else WHOLE, projection="3d")
-    colors = limit_colors(space)
+    colors = _limit_colors(space)
     _, points = draw_robot(ax, space.robot, _place(space), "0.4")
     _draw_hull(ax, space, colors)
     points = np.concatenate((points, space.surface.vertices))
@@ -305,7 +307,7 @@ def workspace(space: Workspace) -> Figure:
     )
     for each in ax.get_children():
         each.set_clip_on(False)
-    set_heading(figure, f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}")
+    set_heading(figure, f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {orientations_text(space)}")
     if limits:
         _draw_bars(figure.add_axes(BELOW if narrow else BARS), space, colors)
     return figure
@@ -317,7 +319,8 @@ def _place(space: Workspace) -> Pose:
     if box is not None and space.levels()(0.5 * (box.low + box.high)[None])[0] >= 0.0:
         return Pose.from_quaternion(0.5 * (box.low + box.high), turn)
     deepest = np.unravel_index(int(np.argmax(space.level)), space.level.shape)
-    return Pose.from_quaternion([float(axis[k]) for axis, k in zip(space.axes, deepest, strict=True)], turn)
+    pose = Pose.from_quaternion([float(axis[k]) for axis, k in zip(space.axes, deepest, strict=True)], turn)
+    return inverse(space.robot, pose).state.pose if is_underconstrained(space.robot) else pose
 
 
 def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
@@ -325,7 +328,7 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
     chosen, faces = _coarser(space.surface.vertices, space.surface.faces)
     if not len(faces):
         return
-    vertices, keys, find = space.surface.vertices[chosen], list(colors), limit_finder(space, list(colors))
+    vertices, keys, find = space.surface.vertices[chosen], list(colors), _limit_finder(space, list(colors))
     known = space.limiting[chosen] != BY_BOX
     free = faces[known[faces].any(axis=1)]
     limit = np.zeros(len(vertices), dtype=np.int64)
@@ -346,7 +349,7 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
 
 
 def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
-    """A simplified mesh for print: indices of the kept corners, one corner per cell of a grid, and the new faces."""
+    """A simplified mesh for print with one corner per cell of a grid: indices of the kept corners, and new faces."""
     if not len(faces):
         return np.empty(0, dtype=np.int64), faces
     low = vertices.min(axis=0)
@@ -359,7 +362,7 @@ def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
 
 
 def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
-    """Draw the limits' shares of the surface as bars; the largest is at the top."""
+    """Draw the shares of the limits in the surface as bars. The largest share is at the top."""
     keys = [(limit.number, limit.cable) for limit in space.limits]
     bars = [
         (_limit_name(key, space), 100.0 * limit.share, colors[key])

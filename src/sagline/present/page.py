@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 from sagline.core.numbers import n
 from sagline.files.writing import atomic_files, create_folder, json_text
 
-SENTENCE = 40  # a table cell with at least this number of characters counts as text
-NARROW = 3  # largest number of columns of a table that is placed beside the text
+SENTENCE = 40  # largest number of characters of a cell that does not wrap
+NARROW = 3  # largest number of columns of a table beside the text
 _subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
 
 
@@ -47,7 +47,7 @@ class Table(NamedTuple):
 
 
 def table_of(caption: str, *columns: tuple[str, Iterable[Any], str]) -> Table:
-    """Create a table from columns. A column is (head, values, format for `n`); texts are not formatted."""
+    """Create a table from `columns`: head, values, and format of the numbers for `n`. Texts are not formatted."""
     cells = [[each if isinstance(each, str) else n(each, form) for each in values] for _, values, form in columns]
     return Table(caption, [head for head, _, _ in columns], list(zip(*cells, strict=True)))
 
@@ -78,21 +78,13 @@ class Chapter:
     findings: tuple[Finding, ...]  # findings of the chapter
 
 
-MANY = {  # texts of the verdicts for several statements
-    Verdict.HOLDS: "hold",
-    Verdict.HOLDS_WITHIN: "hold within limits",
-    Verdict.FAILS: "do not hold",
-    Verdict.ERRATUM: "errata",
-}
-
-
-CLASSES = {
-    Verdict.HOLDS: "holds",
-    Verdict.HOLDS_WITHIN: "within",
-    Verdict.FAILS: "fails",
-    Verdict.OPEN: "open",
-    Verdict.ERRATUM: "fails",
-    Verdict.OURS: "ours",
+_SHOWN = {  # for each verdict: its class in page.css, and its text for several statements
+    Verdict.HOLDS: ("holds", "hold"),
+    Verdict.HOLDS_WITHIN: ("within", "hold within limits"),
+    Verdict.FAILS: ("fails", "do not hold"),
+    Verdict.OPEN: ("open", "cannot be decided"),
+    Verdict.ERRATUM: ("fails", "errata"),
+    Verdict.OURS: ("ours", "not in the article"),
 }
 
 
@@ -122,7 +114,7 @@ def page(
 
 
 def write_page(folder: Path | str, names: tuple[str, str], text: str, numbers: dict[str, Any]) -> tuple[Path, Path]:
-    """Write a page, and its `numbers` as JSON, to `folder` (created if missing). Both files are written, or no file.
+    """Write the page `text`, and its `numbers` as JSON, to `folder` (created if missing). Both or none are written.
 
     Raises:
         FileError: If the folder cannot be written.
@@ -138,17 +130,18 @@ def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
     """Counts of statements by verdict and chapter, and one drawing."""
     counts = Counter(finding.verdict for chapter in chapters for finding in chapter.findings)
     verdicts = [verdict for verdict in Verdict if counts[verdict]]
-    tiles = "".join(
-        f'<li class="{CLASSES[verdict]}"><strong>{counts[verdict]}</strong> {_counted(verdict, counts[verdict])}</li>'
-        for verdict in verdicts
-    )
+    tiles = ""
+    for verdict in verdicts:
+        look, several = _SHOWN[verdict]
+        text = verdict if counts[verdict] == 1 else several
+        tiles += f'<li class="{look}"><strong>{counts[verdict]}</strong> {text}</li>'
     head = '<th scope="col">chapter</th>' + "".join(
         f'<th scope="col"><span>{verdict}</span></th>' for verdict in verdicts
     )
     rows = ""
     for number, chapter in enumerate(chapters, start=1):
         found = Counter(finding.verdict for finding in chapter.findings)
-        cells = "".join(f'<td class="{CLASSES[verdict]}">{found[verdict] or ""}</td>' for verdict in verdicts)
+        cells = "".join(f'<td class="{_SHOWN[verdict][0]}">{found[verdict] or ""}</td>' for verdict in verdicts)
         name = f'<a href="#{chapter.key}">{number}. {_text(chapter.title)}</a>'
         rows += f'<tr><th scope="row">{name}</th>{cells}</tr>'
     return (
@@ -156,10 +149,6 @@ def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
         f'<div class="scroll" tabindex="0"><table class="counts"><thead><tr>{head}</tr></thead>'
         f"<tbody>{rows}</tbody></table></div>\n{_figure(picture) if picture else ''}</div>\n</section>"
     )
-
-
-def _counted(verdict: Verdict, count: int) -> str:
-    return str(verdict) if count == 1 else MANY.get(verdict, str(verdict))
 
 
 def _contents(chapters: Sequence[Chapter]) -> str:
@@ -224,7 +213,7 @@ def _text(text: str) -> str:
 
 
 def _badge(finding: Finding) -> str:
-    return f'<span class="badge {CLASSES[finding.verdict]}">{finding.verdict}</span>'
+    return f'<span class="badge {_SHOWN[finding.verdict][0]}">{finding.verdict}</span>'
 
 
 def _cell(text: str) -> str:

@@ -81,7 +81,7 @@ def text_of(thing: object) -> str:
 
 
 def _summary_of_fields(thing: Any) -> Summary:
-    """Shapes and ranges of the arrays of a result, and its other values."""
+    """Summary of a result without its own summary: shapes and ranges of arrays, and other values."""
     robot = getattr(getattr(thing, "state", thing), "robot", None)
     lines = []
     for name in (field.name for field in fields(thing)):
@@ -97,7 +97,7 @@ def _summary_of_fields(thing: Any) -> Summary:
 
 
 def _extent(values: NDArray[Any], units: list[str]) -> str:
-    """Range of `values` as text, with one unit for all, or with the units of their parts in brackets."""
+    """Range of `values` as text. With several `units`, one per part of the values, they follow in brackets."""
     if values.dtype.kind == "b":
         return f"{np.count_nonzero(values)} of {values.size} true"
     unit = ", ".join(units)
@@ -142,7 +142,7 @@ def _(robot: Robot) -> Summary:
 
 
 def middle_plan(robot: Robot) -> Plan | None:
-    """Plan of the pose in the middle of a robot's test box; None without a test box."""
+    """Plan of the pose in the middle of the test box of `robot`; None if it has no test box or too few cables."""
     box = robot.test_box
     if box is None or is_underconstrained(robot):
         return None
@@ -240,10 +240,7 @@ def _(simulation: Simulation) -> Summary:
         rows.append(Row(key, label, float(course[-1]), text))
     error = float(np.nanmax(np.abs(energy.error)))
     rows.append(Row("energy_error_j", "error of the energy balance", error, n(error, ".2g", "J", size=size)))
-    happened = [
-        f"{event.time:.4g} s: {event.kind}" + ("" if event.cable is None else f", cable {event.cable}")
-        for event in simulation.events[:MOST_GAPS]
-    ]
+    happened = [f"{event.time:.4g} s: {event.text}" for event in simulation.events[:MOST_GAPS]]
     verdict = f"{n(duration, '.4g', 's')}, tensions at the frame {_range(simulation.tensions)}"
     return Summary(f"Simulation of {simulation.robot.name}", verdict, None, tuple(happened), tuple(rows))
 
@@ -257,7 +254,7 @@ def _largest_tensions(simulation: Simulation) -> Array:
 
 
 def cable_mass_text(cable_mass: str) -> str:
-    """Describe the model of the cable mass in a text."""
+    """Description of the model of the cable mass."""
     return "massless" if cable_mass == "none" else f"with cable mass ({cable_mass})"
 
 

@@ -1,4 +1,4 @@
-"""One robot for all poses, or one robot per pose: common properties of all robots of a batch, and selections."""
+"""Batches with one robot for all poses, or with one robot per pose: checks, selections and common properties."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-Robots: TypeAlias = Robot | tuple[Robot, ...]  # a robot, or a checked batch of robots
-Index: TypeAlias = int | slice | NDArray[Any]  # index of a batch
+Robots: TypeAlias = Robot | tuple[Robot, ...]  # one robot for all poses, or one checked robot per pose
+Index: TypeAlias = int | slice | NDArray[Any]  # index that selects poses of a batch
 
-# properties that are equal for all robots of a batch, and their units
+# Properties that must be equal for all robots of a batch, and the units of these properties.
 _ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gravity": " m/s^2"}
 
 
 def together(robot: Robot | Sequence[Robot]) -> Robots:
-    """Check `robot`: a robot, or several with common properties (`_ALIKE`, plane normal), as a tuple."""
+    """Checked robot, or tuple of checked robots; all robots of a tuple have equal properties `_ALIKE`."""
     if isinstance(robot, Robot):
         return robot
     robots = listed(robot, Robot, "robot")
@@ -34,7 +34,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
 
 
 def check_count(robot: Robots, poses: int | None) -> None:
-    """Refuse a tuple of robots unless it has one robot per pose; poses: number of poses, None for a single pose."""
+    """Refuse a tuple of robots with a length other than `poses`, the number of poses (None for a single pose)."""
     if isinstance(robot, Robot) or len(robot) == poses:
         return
     allowed = "one robot" if poses is None else f"one robot, or a sequence of {poses}"
@@ -43,14 +43,14 @@ def check_count(robot: Robots, poses: int | None) -> None:
 
 
 def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
-    """Check the robot, or the tuple with one robot per pose: `together`, then `check_count`."""
+    """Checked robot for all poses, or checked tuple with one robot per pose; poses: number of poses, or None."""
     robots = together(robot)
     check_count(robots, poses)
     return robots
 
 
 def first_of(robot: Robots) -> Robot:
-    """The robot, or the first of several robots, whose common properties apply to all; refuses an empty selection."""
+    """First robot of a batch, with the properties that all robots have in common; refuses an empty tuple."""
     if isinstance(robot, Robot):
         return robot
     if not robot:
@@ -59,20 +59,15 @@ def first_of(robot: Robots) -> Robot:
 
 
 def robots_at(robot: Robots, index: Index) -> Robots:
-    """The single robot of all poses; if each pose has its robot, the robots at the poses of an index."""
+    """Robot or robots of the poses that `index` selects; a robot for all poses is returned unchanged."""
     if isinstance(robot, Robot):
         return robot
     chosen = np.arange(len(robot))[index]
     return robot[int(chosen)] if np.ndim(chosen) == 0 else tuple(robot[i] for i in chosen)
 
 
-def robot_at(robot: Robots, pose: int) -> Robot:
-    """The robot of one pose."""
-    return robot if isinstance(robot, Robot) else robot[pose]
-
-
 def cables_of(robot: Robots) -> Cable:
-    """Material of the cables, (m,), or (N, m) for several robots; optional fields only if all robots have them."""
+    """Material of the cables, fields of shape (m,) or, for N robots, (N, m); a field must be known for all robots."""
     if isinstance(robot, Robot):
         return robot.cables
     materials = [one.cables.known() for one in robot]
@@ -81,36 +76,53 @@ def cables_of(robot: Robots) -> Cable:
 
 
 def has_routing(robot: Robots) -> bool:
-    """True if any cable runs over a pulley or has a dead length."""
+    """True if any cable of the robot or robots runs over a pulley or has a dead length."""
     robots = (robot,) if isinstance(robot, Robot) else robot
     return any(one.winches is not None and one.winches.anything_behind for one in robots)
 
 
+def has_slanted_axes(robot: Robots) -> bool:
+    """True if any pulley of the robot or robots swivels about an axis that is not vertical."""
+    robots = (robot,) if isinstance(robot, Robot) else robot
+    return any(one.winches is not None and bool(one.winches.slanted.any()) for one in robots)
+
+
+def refuse_slanted(robot: Robots) -> None:
+    """Refuse a robot with a swivel axis that is not vertical."""
+    for one in (robot,) if isinstance(robot, Robot) else robot:
+        if one.winches is not None and one.winches.slanted.any():
+            cable = int(np.argmax(one.winches.slanted))
+            shown = ", ".join(f"{x:.3g}" for x in one.winches.swivel_axis[cable])
+            step = "Other axes are supported by inverse, forward, confirm, stiffness and modes, without friction."
+            raise InvalidValueError(f"winches: swivel_axis[{cable}]", f"({shown})", "up or down here", step)
+
+
 def robot_fields(robot: Robots, *names: str) -> tuple[Array, ...]:
-    """Fields of a robot; fields of several robots are stacked along a leading axis N."""
+    """Fields `names` of a robot; the fields of N robots are stacked along a leading axis N."""
     return _each(robot, lambda one: tuple(np.asarray(getattr(one, name)) for name in names))
 
 
 class _Pulleys(NamedTuple):
-    """The pulleys of the cables; a cable without a pulley has radius 0 and enters from below."""
+    """Pulleys of the cables; a cable without a pulley has the radius 0 and counts as entering from below."""
 
     radius: Array  # R [m], shape (m,) or, for several robots, (N, m)
-    entry: Array  # +1 if a cable enters from below, -1 if from above, of the same shape
+    entry: Array  # +1 for a cable that enters its pulley from below, -1 from above; shape of `radius`
 
 
 def pulleys_of(robot: Robots) -> _Pulleys:
-    """Pulleys of the robot or robots."""
+    """Radius and direction of entry of the pulleys of a robot or of N robots, which must have vertical swivel axes."""
+    refuse_slanted(robot)
 
     def own(one: Robot) -> tuple[Array, ...]:
         if one.winches is None:
             return np.zeros(one.cable_count), np.ones(one.cable_count)
-        return one.winches.pulley_radius, one.winches.swivel_axis[:, 2]
+        return one.winches.pulley_radius, np.where(one.winches.swivel_axis[:, 2] < 0.0, -1.0, 1.0)
 
     return _Pulleys(*_each(robot, own))
 
 
 def _each(robot: Robots, own: Callable[[Robot], tuple[Array, ...]]) -> tuple[Array, ...]:
-    """Arrays of one robot, unchanged; or arrays of several robots, stacked along a leading axis N."""
+    """Arrays that the function `own` returns for a robot; the arrays of N robots are stacked along a leading axis N."""
     if isinstance(robot, Robot):
         return own(robot)
     return tuple(np.stack(arrays) for arrays in zip(*(own(one) for one in robot), strict=True))
@@ -126,7 +138,7 @@ def _check_alike(first: Robot, other: Robot, index: int) -> None:
         value, wanted = getattr(other, name), getattr(first, name)
         if value != wanted:
             raise InvalidValueError(f"robot[{index}]: {name}", f"{value}{unit}", f"{wanted}{unit}, as robot[0]", step)
-    # both normals are given or both are None, because the motion patterns are equal
+    # The motion patterns are equal. Therefore, both robots have a plane normal, or neither has one.
     normal, wanted = other.plane_normal, first.plane_normal
     if normal is not None and wanted is not None and not np.array_equal(normal, wanted):
         raise InvalidValueError(f"robot[{index}]: plane_normal", normal, f"{wanted}, as robot[0]", step)
@@ -136,7 +148,7 @@ _TINY = 1e-300
 
 
 def outward(robot: Robots, pose: Pose) -> Array:
-    """Horizontal unit vectors from frame anchors to platform ends, (..., m, 2); zero for a vertical cable."""
+    """Horizontal unit vectors (..., m, 2) that point from frame anchors to platform ends; zero for a vertical cable."""
     frame, platform = robot_fields(robot, "frame_anchors", "platform_anchors")
     ends = pose.position[..., None, :] + platform @ np.swapaxes(pose.matrix, -1, -2)
     level = (ends - frame)[..., :2]
@@ -145,10 +157,10 @@ def outward(robot: Robots, pose: Pose) -> Array:
 
 
 def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
-    """Points on the pulleys in the world [m], (..., m, 3); frame anchors for cables without a pulley.
+    """Points on the pulleys in world axes [m], (..., m, 3); the frame anchor for a cable without a pulley.
 
-    pose: one pose, or a batch of N, which defines the swivel angles of the pulleys; angle: angle along the pulley
-    [rad], (..., m): 0 at the frame anchor, the wrap angle at the exit point.
+    The swivel angles of the pulleys belong to `pose`, which is one pose or a batch. `angle` (..., m) [rad] is the
+    position on the pulley: 0 at the frame anchor, and the wrap angle at the exit point.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
@@ -158,14 +170,14 @@ def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
 
 
 def pulley_centers(robot: Robot, pose: Pose) -> Array:
-    """Centers of the pulleys [m], shape (m, 3), at a horizontal distance of one radius from the frame anchors."""
+    """Centers of the pulleys [m], shape (m, 3); the horizontal distance from the frame anchor is the pulley radius."""
     centers = robot.frame_anchors.copy()
     centers[:, :2] += pulleys_of(robot).radius[:, None] * outward(robot, pose)
     return locked(centers)
 
 
 def dead_cable(robot: Robots) -> Array:
-    """Dead length of each cable [m], (m,) or (N, m): lower bound of its length off the drum."""
+    """Dead length of each cable [m], (m,) or (N, m); a length off the drum cannot be shorter."""
     if not isinstance(robot, Robot):
         return np.stack([dead_cable(one) for one in robot])
     return np.zeros(robot.cable_count) if robot.winches is None else robot.winches.dead_cable

@@ -1,4 +1,4 @@
-"""Robot presets, an initial robot design from a few numbers, and drives of winches from data sheets."""
+"""Robot presets, an initial robot design from a few numbers, and winch drives with the values of data sheets."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def robot_names() -> tuple[str, ...]:
     """Names of the presets.
 
     Returns:
-        The names are in alphabetical order.
+        Names in alphabetical order.
 
     Examples:
         >>> import sagline as sl
@@ -53,11 +53,11 @@ def preset_text(name: str) -> str:
 
 LAYOUTS: Final = ("top", "mixed", "bottom")
 COUNTS: Final = {"top": (8, 6), "mixed": (8, 7)}
-THINNEST, THICKEST = 0.0003, 0.08  # allowed diameters of ropes for cable robots [m]
+THINNEST, THICKEST = 0.0003, 0.08  # smallest and largest allowed diameter of a rope [m]
 SLACK_LIMIT = 0.05  # lower tension limit of a cable, relative to the weight of the platform
-# in counter-clockwise order, relative to the edges of the frame
+# corners in counter-clockwise order; coordinates are divided by the edges of the frame
 _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
-_POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # posts at the corners of a triangle in the same rectangle
+_POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # posts at the corners of a triangle
 
 
 @frozen(eq=False)
@@ -66,13 +66,13 @@ class Design:
 
     Attributes:
         name: Name of the robot.
-        frame: Edges of the frame [m], shape (3,); it is on the floor, centered at the origin.
+        frame: Edges of the frame [m], shape (3,). The frame is on the floor, with its center above the origin.
         platform: Edges of the platform [m], shape (3,), smaller than the edges of the frame.
         mass: Mass of the platform with its payload [kg].
-        rope: Name in the catalogue of ropes.
+        rope: Name of the rope in the catalogue of ropes.
         diameter: Diameter of the rope [m], 0.3 mm to 80 mm.
         cables: Number of cables, 6 to 8.
-        layout: "top" (all cables from above) or "mixed" (from above and from below).
+        layout: "top" (all cables come from above) or "mixed" (cables come from above and from below).
     """
 
     name: str
@@ -85,7 +85,7 @@ class Design:
     layout: str = "top"
 
     def __attrs_post_init__(self) -> None:
-        """Check the data that `Robot` does not check, or that the messages of `Robot` describe in other terms."""
+        """Check the data of the design, whose messages are clearer than messages about the resulting robot."""
         outer, inner = (checked(getattr(self, k), k, "m", shape=(3,), above=0.0) for k in ("frame", "platform"))
         set_fields(self, frame=outer, platform=inner)
         step = "Take a smaller platform."
@@ -102,7 +102,7 @@ class Design:
             raise InvalidValueError("diameter", f"{self.diameter:g} m", allowed, "Give it with its unit.")
 
     def robot(self) -> Robot:
-        """Robot of this design. Its tension limits follow from platform weight and rope strength."""
+        """Robot of this design, with tension limits that are computed from platform weight and rope strength."""
         rope = ROPES[self.rope]
         cable = rope.cable(self.diameter)
         weakest = SLACK_LIMIT * self.mass * 9.81
@@ -132,13 +132,13 @@ class Design:
         )
 
     def placed(self, share: float) -> PoseBox:
-        """Box of platform positions around the center of the frame; share: its edges by the free edges, 0 to 1."""
+        """Box of platform positions around the center of the frame; share: size relative to the free space, 0 to 1."""
         middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
         half = 0.5 * share * (self.frame - self.platform)
         return PoseBox(middle - half, middle + half)
 
     def _anchors(self) -> tuple[Array, Array]:
-        """Frame and platform anchors, shape (m, 3) each."""
+        """Frame anchors and platform anchors of this design [m], shape (m, 3) each."""
         top = self.frame[2]
         if self.layout == "top" and self.cables == 8:
             frame, platform = _crossed()
@@ -150,40 +150,40 @@ class Design:
 
 
 def _at(plane: Array, height: float) -> Array:
-    """Points at a given height, from their horizontal coordinates."""
+    """Points (k, 3) with the horizontal coordinates `plane` (k, 2) and the same `height`."""
     return np.column_stack((plane, np.full(len(plane), height)))
 
 
 def _crossed() -> tuple[Array, Array]:
-    """Two cables from each top corner of the frame: to the next upper and the previous lower corner of the platform."""
+    """Crossed cables: two from each top corner of the frame, to the next upper and the previous lower corner."""
     frame = np.repeat(_at(_CORNERS, 0.5), 2, axis=0)
     upper, lower = _at(np.roll(_CORNERS, -1, axis=0), 0.5), _at(np.roll(_CORNERS, 1, axis=0), -0.5)
     return frame, np.stack((upper, lower), axis=1).reshape(-1, 3)
 
 
 def _octahedron() -> tuple[Array, Array]:
-    """Two cables from each of three posts: to the two nearest corners of a platform triangle, turned by 180 degrees."""
+    """Two cables from each of three posts, which end at the nearest two corners of a triangular platform."""
     frame = np.repeat(_at(_POSTS, 0.5), 2, axis=0)
-    triangle = _at(-_POSTS, 0.5)  # corner k lies opposite post k
+    triangle = _at(-_POSTS, 0.5)  # corner k is opposite to post k
     return frame, triangle[[1, 2, 2, 0, 0, 1]]
 
 
 def _mixed(below: Array) -> tuple[Array, Array]:
-    """Cables from the top corners to adjacent lower platform corners, and from the floor to upper platform corners."""
+    """Cables from the top corners to lower platform corners, and from points `below` on the floor to upper corners."""
     frame = np.concatenate((_at(_CORNERS, 0.5), _at(below, -0.5)))
     return frame, np.concatenate((_at(_CORNERS, -0.5), _at(below, 0.5)))
 
 
-_TURN: Final = 2.0 * pi / 60.0  # [rad/s] per revolution per minute
-_SHORT: Final = 1e-4  # unit of the data sheets [kg m^2]
+_TURN: Final = 2.0 * pi / 60.0  # one revolution per minute [rad/s]
+_SHORT: Final = 1e-4  # unit of inertia in the data sheets, 1e-4 kg m^2 [kg m^2]
 
 
 @dataclass(frozen=True, slots=True)
 class WinchDrive:
-    """Data sheet of a motor, and of its gear if it has one.
+    """Data sheet of a motor with or without a gear.
 
     Attributes:
-        name: Name for `winch_drive`.
+        name: Name of the drive, as an argument of `winch_drive`.
         gear: Turns of the motor per turn of the gear's output shaft.
         inertia: Moment of inertia of motor and gear at the motor's shaft [kg m^2].
         rated_torque: Continuous torque at the motor's shaft [N m].
@@ -191,7 +191,7 @@ class WinchDrive:
         rated_speed: Speed of the motor's shaft at rated torque [rad/s].
         speed_limit: Largest speed of the motor's shaft [rad/s].
         source: The data sheet.
-        assumed: Assumptions, and data in the sheet that are not used.
+        assumed: Assumptions about the drive, and data of the sheet that are not used.
     """
 
     name: str
@@ -210,14 +210,14 @@ class WinchDrive:
         Args:
             drum_radius: Radius of the drum to the surface under the cable [m].
             drum_inertia: Moment of inertia of the drum about its axis [kg m^2], >= 0.
-            fields: Other fields of `Winch`, position_gain for instance.
+            fields: Other fields of `Winch`, such as position_gain.
 
         Returns:
-            The winch with gear, inertia and limits of the drive. The inertia includes the inertia of the drum.
+            The winch with gear, inertia and limits of the drive; the inertia of the drum is included.
 
         Raises:
-            InvalidValueError: If a value is out of its range, or if a field does not exist in `Winch` or belongs to the
-                drive.
+            InvalidValueError: If a value is out of its range, if a field does not exist in `Winch`, or if the drive
+                already defines the field.
 
         Examples:
             >>> import sagline as sl
@@ -304,7 +304,7 @@ def winch_drive_names() -> tuple[str, ...]:
     """Names of the drives in the catalogue.
 
     Returns:
-        The names are in alphabetical order.
+        Names in alphabetical order.
 
     Examples:
         >>> import sagline as sl
@@ -324,13 +324,13 @@ def winch_drive(name: str) -> WinchDrive:
         The drive, with its source and assumptions.
 
     Raises:
-        InvalidValueError: If the drive does not exist; the message suggests a similar name.
+        InvalidValueError: If no drive has this name; the message suggests a similar name.
 
     Examples:
         >>> import sagline as sl
         >>> drive = sl.winch_drive("yaskawa-sgmah-01aj1")
     """
-    given: Any = name  # a caller without type checks may pass anything
+    given: Any = name  # an untyped caller may pass any object
     word = str(given) if isinstance(given, str) else ""
     if word in _DRIVES:
         return _DRIVES[word]

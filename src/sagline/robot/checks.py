@@ -1,4 +1,4 @@
-"""Motion patterns, which select the free motions, and checks of a robot's fields, which return the stored values."""
+"""Motion patterns and the free motions that they allow; checks of a robot's fields, which return checked values."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
 
 
 def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
-    """Orthonormal rows (n, 6) that select the free components of a wrench or twist in world axes.
+    """Orthonormal rows (n, 6), one per free motion; a row selects a component of a wrench or twist in world axes.
 
-    plane_normal: unit normal of the plane of a planar pattern, (3,). Its translations are e1 and e2 with e1 x e2 =
-    plane_normal; e1 is horizontal, and e2 points upward as steeply as the plane allows. The rotation is the last row.
+    A planar pattern needs `plane_normal`, the unit normal (3,) of its plane. The first two rows are the translations e1
+    and e2 with e1 x e2 = plane_normal; e1 is horizontal, and e2 points upward as steeply as the plane allows.
     """
     if plane_normal is None:
         return _SPATIAL[pattern]
@@ -35,23 +35,23 @@ def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
 
 
 def _plane_axes(normal: Array) -> Array:
-    # the length of this vector is the sine of the angle between normal and vertical
+    # vector with the length sin(angle between normal and vertical)
     horizontal = np.cross((0.0, 0.0, 1.0), normal)
     length = float(np.linalg.norm(horizontal))
-    if length < 1e-12:  # in a horizontal plane (except for rounding) every direction is horizontal; x is chosen
+    if length < 1e-12:  # all directions of a horizontal plane are horizontal: choose x
         horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
         length = float(np.linalg.norm(horizontal))
     first = horizontal / length
     return np.stack([first, np.cross(normal, first)])
 
 
-_SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
-# tolerance for moments with three digits: the largest moment of a thin plate equals the sum of the other two
+_SYMMETRY = 1e-9  # largest difference between elements [i, j] and [j, i], relative to the largest element
+# Tolerance of the triangle inequality for moments with three digits. A thin plate satisfies it with equality.
 _ROUNDED = 0.01
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
-    """Frame and platform anchors [m], (m, 3) each, one pair per cable; all pairs are different."""
+    """Checked frame and platform anchors [m], (m, 3) each. No two cables have the same pair of anchors."""
     pair = []
     for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
         array = checked(value, item, "m", shape=(None, 3))
@@ -68,7 +68,7 @@ def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
 
 
 def _refuse_twins(ends: Array) -> None:
-    if len({row.tobytes() for row in ends + 0.0}) == len(ends):  # adding 0.0 removes negative zeros
+    if len({row.tobytes() for row in ends + 0.0}) == len(ends):  # + 0.0 changes -0.0 to 0.0
         return
     _, first, which = np.unique(ends, axis=0, return_index=True, return_inverse=True)
     twin_of = first[which.reshape(-1)]
@@ -81,22 +81,23 @@ def _refuse_twins(ends: Array) -> None:
 
 
 def cables(given: Cable, count: int) -> Cable:
-    """The material of the cables with fields of shape (m,); each linear density is positive."""
+    """Checked material of the cables with fields of shape (m,) and positive linear densities."""
     instance(given, Cable, "cables")
     fields = {name: per_cable(field, f"cables: {name}", count) for name, field in given.known().items()}
     step = "Give the mass per length of the cable; to neglect its weight, use the model Elastic or Straight."
     density = fields["linear_density"]
-    # np.abs prints -0 as 0
+    # np.abs avoids the text -0 in the message
     refuse_first(density == 0.0, "cables: linear_density", np.abs(density), "kg/m", "> 0 kg/m", step)
     return given if given.linear_density.shape == (count,) else given.replace(**fields)
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:
-    """Inertia about the center of mass [kg m^2], (3, 3): symmetric, without negative moments, or None for zeros.
+    """Checked inertia about the center of mass [kg m^2], (3, 3): symmetric, without negative principal moments.
 
-    It is positive about each axis of free rotation. A body with three free rotations must also satisfy the triangle
-    inequality: each principal moment is at most the sum of the other two. For a planar platform, the moments about the
-    axes in its plane may be zero, because other tools write zeros. Without rotations all moments may be zero.
+    The moment about each axis of free rotation must be positive. A body with three free rotations must also satisfy the
+    triangle inequality: each principal moment is at most the sum of the two other moments. Moments about axes without
+    free rotation may be zero, because other tools write zeros. If no rotation is free, `given` may be None, which means
+    zeros.
     """
     if given is None and pattern in ROTATING:
         step = f"The motion pattern {pattern} has a rotation; give the inertia."
@@ -117,7 +118,7 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
 
 
 def _check_moments(moments: Array, *, everywhere: bool) -> None:
-    """Refuse impossible principal moments [kg m^2], in increasing order; everywhere: True if all rotations are free."""
+    """Refuse impossible principal `moments` [kg m^2], sorted by size; everywhere: True if all rotations are free."""
     least = 0.0 if everywhere else np.nextafter(-_SYMMETRY * abs(moments[2]), -1.0)
     step = "the inertia about the center of mass, in the platform frame."
     if moments[0] <= least:
@@ -130,7 +131,7 @@ def _check_moments(moments: Array, *, everywhere: bool) -> None:
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
-    """Unit normal of the plane of motion, from a nonzero vector; None if the motion pattern is not planar."""
+    """Unit vector along the nonzero vector `given`, normal to the plane of motion; None for a pattern in space."""
     if (given is None) == (pattern in PLANAR):
         has = "not given" if given is None else "given"
         allowed = "a vector of three numbers" if given is None else "nothing"
@@ -145,7 +146,7 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
 
 
 def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
-    """Lower and upper tension limits [N], (m,). No limit is negative; a lower limit is at most the upper limit."""
+    """Checked tension limits [N], (m,) each: nonnegative, and no lower limit is larger than the upper limit."""
     lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
     upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)
     allowed, step = "<= tension_max[{i}], {limit:g} N", "Lower this limit, or raise the other one."
@@ -154,12 +155,12 @@ def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[A
 
 
 def per_cable(array: Array, item: str, count: int) -> Array:
-    """Values (m,), one per cable; the argument is one value per cable, or a single value for all cables."""
+    """Values (m,), one per cable, from an array with one value per cable or with a single value for all cables."""
     if array.shape not in ((), (1,), (count,)):
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value per cable.")
     return array if array.shape == (count,) else locked(np.full(count, array))
 
 
 def size(given: ArrayLike | None, item: str) -> Array | None:
-    """Edge lengths [m] for drawing, (3,), or None."""
+    """Checked edge lengths (3,) of a box that is drawn [m], or None."""
     return None if given is None else exactly(given, item, "m", (3,), above=0.0)

@@ -1,4 +1,4 @@
-"""Drums of a robot: conversions between length off the drum, turns of the drum and encoder counts."""
+"""Drums of a robot: conversions between lengths off the drum, turns on the drum and encoder counts."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from sagline.kernels.cable import drum
 from sagline.kernels.codes import CATENARY
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
-from sagline.robot.routing import actual_routing, differs
+from sagline.robot.routing import actual_routing, differs, tension_after
 from sagline.robot.winch import Winch
 
-ROUNDING: Final = 1e-6  # number of turns that are tolerated beyond a full or an empty drum
+ROUNDING: Final = 1e-6  # turns; tolerance of the check that the number of turns on a drum is possible
 _ZERO_STEP: Final = (
     "Give it in the robot file, or determine it with home(robot, pose, frame_end_tension) and save the new robot; "
     "then plan again."
@@ -28,15 +28,15 @@ _ZERO_STEP: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drums:
-    """The drums of m cables. All lengths are lengths off the drums at the winding tension.
+    """Drums of m cables. All lengths are lengths off the drums at the winding tension.
 
     Attributes:
         winches: The winch data, fields of shape (m,).
-        table: Drum data in the form for kernels, shape (m, DRUM_COLUMNS).
-        starts: Length off the drum where each layer begins [m], shape (m, layers + 1); -inf for a layer without an end.
+        table: Drum data for kernels, shape (m, DRUM_COLUMNS).
+        starts: Length off the drum at which each layer begins [m], shape (m, layers + 1); -inf after an endless layer.
         rest_strain: Strain of the cable on the drum, shape (m,).
-        fewest: Turns on the empty drum, shape (m,): 0, or -inf if the length of the cable is not known.
-        most: Turns on the full drum, shape (m,); inf if not known.
+        fewest: Smallest number of turns on the drum, shape (m,): 0, or -inf if the length of the cable is not known.
+        most: Largest number of turns on the drum, shape (m,); inf if not known.
     """
 
     winches: Winch
@@ -47,7 +47,7 @@ class Drums:
     most: Array
 
     def turns(self, length: Array) -> tuple[Array, Array]:
-        """Turns on the drums, and change of length per turn [m], at lengths off the drums [m], (N, m); NaN for NaN."""
+        """Turns on the drums and change of length per turn [m] for lengths off the drums (N, m) [m]; NaN stays NaN."""
         turns, travel = self._turns(length)
         if (wrong := self._off(turns)) is not None:
             sample, i = wrong
@@ -58,20 +58,20 @@ class Drums:
         return turns, travel
 
     def lengths(self, turns: Array) -> Array:
-        """Lengths off the drums [m] at given turns on the drums, shape (N, m)."""
+        """Lengths off the drums [m] for `turns` on the drums, both of shape (N, m)."""
         length = np.empty(turns.shape)
         drum.lengths_of_turns(self.table, self.starts, kernel_input(turns, turns.shape), length)
         return length
 
     def counts(self, length: Array) -> Array:
-        """Encoder counts at lengths off the drums, both of shape (N, m), not rounded."""
+        """Encoder counts, not rounded, for lengths off the drums [m], both of shape (N, m)."""
         zero, rate = self.zero_and_rate()
         turns, _ = self.turns(length)
         found: Array = self.winches.count_zero + (zero - turns) * rate
         return found
 
     def lengths_at(self, counts: Array) -> Array:
-        """Lengths off the drums [m] at encoder counts, both of shape (N, m)."""
+        """Lengths off the drums [m] for encoder counts, both of shape (N, m)."""
         zero, rate = self.zero_and_rate()
         turns = zero - (counts - self.winches.count_zero) / rate
         if (wrong := self._off(turns)) is not None:
@@ -88,7 +88,7 @@ class Drums:
         return lengths
 
     def zero_and_rate(self) -> tuple[Array, Array]:
-        """Turns on the drums at count_zero, which belong to length_zero, and counts per turn paid out, both (m,)."""
+        """Turns on the drums at length_zero, and encoder counts per turn that is paid out, both (m,)."""
         per_turn, length = _given(self.winches, "counts_per_turn"), _given(self.winches, "length_zero", _ZERO_STEP)
         turns, _ = self._turns(length[None])
         if (wrong := self._off(turns)) is not None:
@@ -103,7 +103,7 @@ class Drums:
         return turns, travel
 
     def _off(self, turns: Array) -> tuple[int, int] | None:
-        """Index of the first sample and cable with a length outside the range of the drum."""
+        """Sample and cable of the first value of `turns` that is out of range; None if all values are possible."""
         wrong = (turns > self.most + ROUNDING) | (turns < self.fewest - ROUNDING)
         if not wrong.any():
             return None
@@ -111,7 +111,7 @@ class Drums:
         return int(sample), int(cable)
 
     def _ends(self, cable: int) -> Array:
-        """Smallest and largest length off a drum [m]."""
+        """Smallest and largest possible length off the drum of a cable [m]."""
         most = float(self.most[cable])
         low = self.lengths(np.full((1, len(self.most)), most))[0, cable] if most < np.inf else 0.0
         return np.array([max(low, 0.0), self.starts[cable, 0]])
@@ -128,10 +128,9 @@ class Drums:
 
 
 def drums_of(robot: Robot) -> Drums:
-    """Drums of a robot. Its winches need drum_radius and groove_pitch. Its cables need a diameter.
+    """Drums of a robot. The winches must have drum_radius and groove_pitch, and the cables a diameter.
 
-    Several layers also need drum_width and cable_length. A cable exit that moves along the drum also needs
-    cable_length.
+    Drums with several layers also need drum_width and cable_length. A drum_distance also requires cable_length.
     """
     winches, diameter = robot.winches, robot.cables.diameter
     names = ["drum_radius", "groove_pitch"]
@@ -149,7 +148,7 @@ def drums_of(robot: Robot) -> Drums:
 
 
 def not_given(names: Sequence[str]) -> tuple[str, str]:
-    """Item and value of a message about the missing fields `names`; the item names each type only once."""
+    """Item and value of a message about missing fields; names: type and field, such as "winches: drum_radius"."""
     if len(names) == 1:
         return names[0], "not given"
     kinds = groupby((name.split(": ", 1) for name in names), key=lambda words: words[0])
@@ -158,12 +157,12 @@ def not_given(names: Sequence[str]) -> tuple[str, str]:
 
 
 def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
-    """Table of the drums for kernels, and the lengths at which their layers begin."""
+    """Table of the drums for kernels, and the lengths off the drums at which layers begin [m]."""
     pitch, width = _given(winches, "groove_pitch"), winches.drum_width
     _check_width(winches, pitch)
     table = np.empty((len(pitch), drum.DRUM_COLUMNS))
     table[:, drum.PITCH_RADIUS] = _given(winches, "drum_radius") + 0.5 * diameter
-    table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies between two turns of the layer below
+    table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies in the gap between two turns below
     table[:, drum.GROOVE_PITCH] = pitch
     table[:, drum.LAYER_TURNS] = np.inf if width is None else width / pitch
     table[:, drum.LAYERS] = winches.layers
@@ -175,12 +174,12 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 def _layer_starts(winches: Winch, table: Array) -> Array:
     """Lengths off the drum at which the layers begin [m].
 
-    Such a length is the cable length minus two lengths: the length on the layers below, and the extra length that the
-    cable between drum and pulley has because it is slanted.
+    A layer begins at the length of the cable minus the length on lower layers, minus the extra length between drum and
+    pulley due to the oblique direction of the cable.
     """
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
-    # if cable_length is unknown, turns are counted from length_zero
+    # if cable_length is unknown, zero turns are at length_zero
     whole = np.zeros(len(table)) if known is None else known
     circle = 2.0 * np.pi * (table[:, drum.PITCH_RADIUS] + count[:, None] * table[:, drum.LAYER_RISE])
     layer = np.hypot(circle, table[:, drum.GROOVE_PITCH]) * table[:, drum.LAYER_TURNS]
@@ -192,7 +191,7 @@ def _layer_starts(winches: Winch, table: Array) -> Array:
 
 
 def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
-    """Strain of the cable on the drums, turns on the empty drums, and turns on the full drums."""
+    """Strain of the cable on the drums, and smallest and largest number of turns on the drums, each (m,)."""
     strain = locked(winches.winding_tension / robot.cables.axial_stiffness)
     if winches.cable_length is None:
         endless = np.full(strain.shape, np.inf)
@@ -202,12 +201,12 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def drum_tension(state: Equilibrium) -> Array:
-    """Tension of the cables at the drum [N], (m,) or (N, m); with friction if the state has winding directions.
+    """Tension of the cables at the drum [N], (m,) or (N, m). Friction is included if the state has winding directions.
 
-    Along an exact cable without friction, T + T^2/(2 EA) - w z is constant (z is the height). With the other models,
-    the cable between pulley and drum has no weight, and its tension is the chord tension. The tension of a slack cable
-    that leaves a drum downward is negative. It is NaN if the cable length becomes negative. docs/model.md,
-    section 10.
+    Along an exact cable without friction, T + T^2/(2 EA) - w z is constant; z is the height. In all other models, the
+    cable between pulley and drum has no weight, and the drum tension is the chord tension. A slack cable that leaves a
+    drum downward has a negative tension. A tension that would give a negative length is NaN. See docs/model.md, section
+    10.
     """
     robot, cables = state.one_robot, state.cables
     if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
@@ -218,15 +217,12 @@ def drum_tension(state: Equilibrium) -> Array:
     drum_height = height if robot.winches is None else height - robot.winches.dead_rise
     fall = state.exit_point[..., 2] - drum_height
     stiffness = robot.cables.axial_stiffness
-    strain = cables.frame_end_tension / stiffness
-    lost = 2.0 * robot.cables.linear_density * robot.gravity * fall / stiffness
-    gained = strain * (2.0 + strain) - lost  # (1 + strain at the drum)^2 - 1
-    with np.errstate(invalid="ignore"):
-        return locked(stiffness * gained / (1.0 + np.sqrt(1.0 + gained)))
+    drop = 2.0 * robot.cables.linear_density * robot.gravity * fall / stiffness
+    return locked(tension_after(cables.frame_end_tension, drop, stiffness))
 
 
 def warmth(robot: Robot, temperature: Any) -> Array | float:
-    """Factor of thermal expansion 1 + expansion * `temperature`, (m,) or a number; temperature difference [K]."""
+    """Factor 1 + expansion * `temperature` of a cable length, (m,) or a number; temperature: difference [K]."""
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
         allowed, step = f"shape () or ({robot.cable_count},)", "Give one value, or one value per cable."
@@ -264,9 +260,9 @@ def _at(item: str, sample: int, cable: int, samples: int) -> str:
 
 
 def drum_lever(robot: Robot, length: Array) -> Array:
-    """Cable length per radian of drum rotation [m], at lengths off the drums (m,) or (N, m) [m].
+    """Lever arm: cable length per radian of drum rotation [m], for lengths off the drums (m,) or (N, m) [m].
 
-    These are the levers of the layers in use; drum_radius plus half the cable diameter if drum data are unknown.
+    The lever arm depends on the layer. Without drum data, the lever arm is drum_radius plus half of the cable diameter.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from importlib import import_module
 from typing import Any, ClassVar, Concatenate, Final, ParamSpec, Protocol, TypeVar, overload
@@ -24,6 +24,7 @@ from sagline.robot.batch import (
     cables_of,
     first_of,
     has_routing,
+    has_slanted_axes,
     points_on_pulleys,
     robot_fields,
     robots_at,
@@ -33,24 +34,26 @@ from sagline.robot.robot import Robot
 
 _P = ParamSpec("_P")
 _R_co = TypeVar("_R_co", covariant=True)
-# imported by name when it is needed, because inverse kinematics imports this module
+# loaded by name on demand, because inverse kinematics imports this module
 _INVERSE: Final = "sagline.kinematics.inverse"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Contact(Result):
-    """Cables on pulleys, and their dead lengths; fields of shape (m,) or (N, m).
+    """Contact of the cables with pulleys, and dead lengths; fields of shape (m,) or (N, m).
 
     Attributes:
         wrap_angle: Psi, the angle over which a cable lies on its pulley [rad].
         wrapped_length: Unstrained length on the pulley [m].
         dead_length: Unstrained length between pulley and drum [m].
-        chord_tension: T_x/cos phi along the tangent from the platform end to the pulley [N]. Tension distribution and
-            limits apply to this tension. The chord of the free span is another line, which starts at the actual exit
-            point.
-        chord_sine: sin phi of this tangent.
-        winding: Direction of each drum, which determines the friction: +1 winding in, -1 paying out, 0 at rest. None:
-            no friction.
+        chord_tension: T_x/cos phi [N], where phi is the elevation of the tangent from the platform end to the pulley.
+            Tension distribution and limits apply to this chord tension. The chord of the free span is a different line,
+            which begins at the exit point of the sagging cable.
+        chord_sine: sin phi, where phi is the elevation of the same tangent.
+        winding: Direction of motion of each drum, on which friction depends: +1 winding in, -1 paying out, 0 at rest.
+            None: no friction.
+        azimuth: Azimuth of the vertical plane of each free span [rad], if a swivel axis is not vertical; chord_tension
+            and chord_sine are then those of the free span's chord. None: vertical swivel axes, which are in the planes.
     """
 
     wrap_angle: Array
@@ -59,28 +62,29 @@ class Contact(Result):
     chord_tension: Array
     chord_sine: Array
     winding: Array | None = None
+    azimuth: Array | None = None
 
     def part(self, index: Index) -> Contact:
-        """Contact at the poses of the index."""
+        """Contact at the poses that `index` selects."""
         known = {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
         return Contact(**{name: locked(field[index, ...]) for name, field in known.items()})
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Equilibrium(Result, Tabular):
-    """Equilibrium of a robot, the input of stiffness, vibration, viewer and files.
+    """Equilibrium of a robot: pose, wrench, and states of all cables.
 
-    A batch is indexed like an array: `state[3]` is a single pose, `state[2:5]` and `state[mask]` are batches. Slices
-    share the memory of the batch.
+    A batch is indexed like an array: `state[3]` is a single pose; `state[2:5]` and `state[mask]` are batches. A slice
+    shares the memory of the batch.
 
     Attributes:
         robot: The robot, or a tuple of N robots, one per pose.
         pose: Pose of the platform, single or a batch of N.
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
-        cables: State of the free spans, from their exit points to their platform ends, fields of shape (m,) or (N, m).
-        contact: Wrapped and dead lengths of the cables. None if the robot has neither pulleys nor dead lengths: each
-            cable then starts at its frame anchor, and its length off the drum is its free length.
+        cables: State of the free spans between exit points and platform ends, fields of shape (m,) or (N, m).
+        contact: Wrapped and dead lengths of the cables. None for a robot with neither pulleys nor dead lengths, whose
+            cables start at the frame anchors.
     """
 
     _columns: ClassVar[Columns] = ("pose", "L#=unstrained_length", "T#=chord_tension")
@@ -93,7 +97,7 @@ class Equilibrium(Result, Tabular):
 
     @property
     def unstrained_length(self) -> Array:
-        """Whole unstrained length L off the drum [m], shape (m,) or (N, m): free, wrapped and dead length."""
+        """Unstrained length L off the drum [m], shape (m,) or (N, m): sum of free, wrapped and dead length."""
         if self.contact is None:
             return self.cables.unstrained_length
         return locked(self.free_length + (self.contact.wrapped_length + self.contact.dead_length))
@@ -105,33 +109,39 @@ class Equilibrium(Result, Tabular):
 
     @property
     def chord_tension(self) -> Array:
-        """Chord tension tau = T_x/cos phi [N], shape (m,) or (N, m); on a pulley, phi belongs to the tangent.
+        """Chord tension tau = T_x/cos phi [N], shape (m,) or (N, m); phi: elevation of the chord or pulley tangent.
 
-        Tension distribution and limits apply to this tension, unless the robot limits the frame-end tension.
+        Tension distribution and limits apply to the chord tension, unless the robot limits the frame-end tension.
         """
         return self.cables.chord_tension if self.contact is None else self.contact.chord_tension
 
     @property
     def pull(self) -> Array:
-        """Sag force of the cables: vertical force at the platform end due to their weight, T_z - tau sin phi [N]."""
+        """Sag force T_z - tau sin phi of each cable: vertical force at the platform end due to the weight [N]."""
         cables = self.cables
         sine = cables.rise / cables.chord if self.contact is None else self.contact.chord_sine
         return locked(cables.vertical_force - self.chord_tension * sine)
 
     @property
     def exit_point(self) -> Array:
-        """Exit points of the cables on pulleys, or frame anchors, world axes [m], shape (m, 3) or (N, m, 3)."""
+        """Exit points in world axes [m], shape (m, 3) or (N, m, 3); frame anchors for cables without pulleys."""
         if self.contact is None:
             (anchors,) = robot_fields(self.robot, "frame_anchors")
             return locked(np.array(np.broadcast_to(anchors, (*self.cables.shape, 3))))
+        if self.contact.azimuth is not None:
+            (ends,) = robot_fields(self.robot, "platform_anchors")
+            ends = self.pose.position[..., None, :] + ends @ np.swapaxes(self.pose.matrix, -1, -2)
+            span, azimuth = self.cables.span, self.contact.azimuth
+            chord = np.stack((span * np.cos(azimuth), span * np.sin(azimuth), self.cables.rise), axis=-1)
+            return locked(ends - chord)
         return locked(points_on_pulleys(self.robot, self.pose, self.contact.wrap_angle))
 
     @property
     def one_robot(self) -> Robot:
-        """The robot, if it is the same at all poses.
+        """The robot of all poses.
 
         Raises:
-            InvalidValueError: If there is one robot per pose.
+            InvalidValueError: If the equilibrium has one robot per pose.
         """
         if isinstance(self.robot, Robot):
             return self.robot
@@ -146,11 +156,11 @@ class Equilibrium(Result, Tabular):
         """One pose of a batch, or a part of the batch.
 
         Args:
-            index: A number (negative: from the end), a slice, or an array of numbers or of N booleans.
+            index: A number (negative numbers count from the end), a slice, or an array of numbers or of N booleans.
 
         Raises:
-            NoBatchError: If the equilibrium has a single pose (also a TypeError).
-            NoSuchEntryError: If a pose does not exist (also an IndexError).
+            NoBatchError: If the equilibrium has a single pose; the error is also a TypeError.
+            NoSuchEntryError: If a pose does not exist; the error is also an IndexError.
         """
         part = part_of(index, self.pose.shape, "single equilibrium")
         contact = None if self.contact is None else self.contact.part(part)
@@ -168,15 +178,15 @@ class Equilibrium(Result, Tabular):
 
 
 class HasState(Protocol):
-    """A result with an equilibrium, such as a plan, a forward solution or a vibration."""
+    """Any result that contains an equilibrium, such as a plan, a forward solution or a vibration."""
 
     @property
     def state(self) -> Equilibrium:
-        """The equilibrium."""
+        """Equilibrium that the result contains."""
 
 
 class OfEquilibrium(Protocol[_P, _R_co]):
-    """A function of an equilibrium, of a result with an equilibrium, or of a robot and a pose."""
+    """Function that accepts an equilibrium, a result that contains one, or a robot with a pose."""
 
     @overload
     def __call__(self, state: Equilibrium | HasState, *args: _P.args, **options: _P.kwargs) -> _R_co: ...
@@ -185,7 +195,7 @@ class OfEquilibrium(Protocol[_P, _R_co]):
 
 
 def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state") -> Equilibrium:
-    """The given equilibrium, the equilibrium in a given result, or the equilibrium of a given robot at given poses."""
+    """Equilibrium that `start` is or contains, or the equilibrium of the robot `start` at `pose`."""
     if isinstance(start, Robot) and pose is not None:
         found: Equilibrium = import_module(_INVERSE).equilibrium_at(start, pose)
         return found
@@ -194,7 +204,7 @@ def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state"
 
 
 def of_result(function: Callable[Concatenate[Equilibrium | HasState, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
-    """Let a function of an equilibrium or of a result also accept a robot and a pose."""
+    """Decorator: the function accepts a robot and a pose in place of an equilibrium or result."""
 
     @wraps(function)
     def call(*given: Any, **options: Any) -> _R_co:
@@ -207,7 +217,7 @@ def of_result(function: Callable[Concatenate[Equilibrium | HasState, _P], _R_co]
 
 
 def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
-    """Let a function of an equilibrium also accept a result, or a robot and a pose."""
+    """Decorator: the function accepts a result, or a robot and a pose, in place of an equilibrium."""
 
     @wraps(function)
     def of_state(start: Equilibrium | HasState, /, *args: _P.args, **options: _P.kwargs) -> _R_co:
@@ -217,19 +227,26 @@ def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> O
 
 
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:
-    """Tension to which the limits of the robot or robots apply [N]: chord tension or frame-end tension."""
+    """Tension to which tension limits apply [N]: chord tension or frame-end tension, depending on the robot."""
     if first_of(robot).tension_limits_of == "frame_end":
         return cables.frame_end_tension
     return cables.chord_tension if contact is None else contact.chord_tension
 
 
+def result_rows(robot: Robots) -> int:
+    """Number of rows of kernel results for a robot or robots."""
+    if has_slanted_axes(robot):
+        return tables.SWIVEL_ROWS
+    return tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS
+
+
 def cables_of_results(
     robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
 ) -> tuple[CableState, Contact | None]:
-    """States of the free spans of solved poses, and their contact, or None if no cable has a pulley or a dead length.
+    """States of the free spans at solved poses; contact with pulleys, or None without pulleys and dead lengths.
 
-    results: rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: ()
-    or (N,), of the poses.
+    results: rows of `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: shape
+    of the poses, () or (N,).
     """
     m = results.shape[2]
 
@@ -241,6 +258,8 @@ def cables_of_results(
     if has_routing(robot):
         rows = (tables.WRAP, tables.WRAPPED, tables.DEAD, tables.TENSION, tables.SINE)
         contact = Contact(*(row(k) for k in rows))
+        if len(results) > tables.RESULT_ROWS:
+            contact = replace(contact, azimuth=row(tables.AZIMUTH))
         length = locked(length - (contact.wrapped_length + contact.dead_length))
         tension = locked(_free_chord_tension(span, rise, row(tables.HORIZONTAL), tension))
     cables = CableState(
@@ -259,7 +278,7 @@ def cables_of_results(
 
 
 def _free_chord_tension(span: Array, rise: Array, horizontal: Array, tension: Array) -> Array:
-    """Chord tensions of the free spans; for a vertical free span, the given chord tension is returned."""
+    """Chord tensions of the free spans [N]; `tension` for a vertical span, whose horizontal tension is zero."""
     level = np.where(span > 0.0, span, 1.0)
     own: Array = np.where(span > 0.0, horizontal * (np.hypot(span, rise) / level), tension)
     return own

@@ -1,4 +1,4 @@
-"""Poses of the platform: position of its origin and rotation from platform to world; boxes of poses."""
+"""Poses of the platform (position of its origin, rotation from platform to world), and boxes of poses."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from sagline.core.memory import check_memory
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-# Rounding error: the length of a normalized vector of 3 or 4 numbers differs from 1 by at most 2.5 eps.
+# Largest rounding error of the length of a normalized vector of 3 or 4 numbers.
 _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def unit(vectors: Array) -> Array:
-    """Normalize vectors along the last axis; zero vectors give NaN.
+    """Unit vectors along `vectors` (last axis); NaN for a zero vector.
 
-    A vector whose length differs from 1 only by rounding errors is unchanged, because loading and copying repeat the
-    normalization, which must not change values. The given array itself is returned if all lengths are 1.
+    A vector is unchanged if its length differs from 1 only by rounding errors, because loading and copying normalize
+    vectors again, and must not change values. If all lengths are 1, the given array itself is returned.
     """
     length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., np.newaxis]
     if (np.abs(length - 1.0) <= _ROUNDING).all():
@@ -40,16 +40,16 @@ def unit(vectors: Array) -> Array:
 
 @frozen(eq=False, weakref_slot=False)
 class PoseBox:
-    """Positions of the platform origin in a box, with rotations about any axis up to a tilt angle.
+    """Box of poses: positions of the platform origin in a box, with rotations up to a tilt angle about any axis.
 
     Attributes:
         low: Lowest position of the platform origin [m], shape (3,).
-        high: Highest position of the platform origin [m], shape (3,), not below low.
+        high: Highest position of the platform origin [m], shape (3,), at least `low`.
         tilt: Largest angle of rotation [rad], 0 to pi.
 
     Raises:
-        InvalidValueError: If a number is not finite, a corner does not have three numbers, high is below low, or the
-            tilt is more than pi.
+        InvalidValueError: If a number is not finite, if a corner does not have three numbers, if `high` is below `low`,
+            or if `tilt` is more than pi.
     """
 
     low: Array = field(converter=given, metadata=rule("m", shape=(3,)))
@@ -79,13 +79,23 @@ class PoseBox:
     __reduce__ = reduced
 
 
-_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 for which a matrix Q is accepted as a rotation
-_QUATERNION_TOLERANCE = 1e-6  # tolerance that accepts a quaternion with seven digits
+def level_grid(box: PoseBox, counts: Sequence[int]) -> Pose:
+    """Level poses on an even grid in a box; an axis of no extent or with one point has one point, in its middle."""
+    axes = [
+        np.linspace(low, high, count) if count > 1 and high > low else np.array([0.5 * (low + high)])
+        for low, high, count in zip(box.low, box.high, counts, strict=True)
+    ]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return Pose.from_euler(places, 0.0, 0.0, 0.0)
+
+
+_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 for a matrix Q that is accepted as a rotation
+_QUATERNION_TOLERANCE = 1e-6  # tolerance of a quaternion's length, sufficient for quaternions with seven digits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """One pose of the platform frame, or a batch of them.
+    """One pose of the platform frame, or a batch of poses.
 
     Attributes:
         position: Position of the platform frame's origin in the world [m], shape (3,) or (N, 3).
@@ -100,15 +110,15 @@ class Pose:
     ) -> None:
         """Pose from a position and a rotation.
 
-        `Pose(x, y, z)` is a level pose; x, y and z are numbers, or arrays of shape (N,).
+        `Pose(x, y, z)` is a pose without rotation; x, y and z are numbers, or arrays of shape (N,).
 
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
-            rotation: scipy Rotation, or rotation matrices of shape (3, 3) or (N, 3, 3); None: level.
-            z: Third coordinate [m] of a level pose; position and rotation are then x and y.
+            rotation: scipy Rotation, or rotation matrices of shape (3, 3) or (N, 3, 3); None for no rotation.
+            z: Coordinate z [m] of a pose without rotation; the arguments `position` and `rotation` are then x and y.
 
         Raises:
-            InvalidValueError: If a number is not finite, a matrix is not a rotation, or the counts differ.
+            InvalidValueError: If a number is not finite, if a matrix is not a rotation, or if the lengths N differ.
 
         Examples:
             >>> import sagline as sl
@@ -124,7 +134,7 @@ class Pose:
 
     @classmethod
     def from_euler(cls, position: ArrayLike, alpha: ArrayLike, beta: ArrayLike, gamma: ArrayLike) -> Pose:
-        """A pose from Z-Y-X Euler angles: alpha about z, then beta about the new y, then gamma about the new x.
+        """Create a pose from Z-Y-X Euler angles: alpha about z, then beta about the new y, then gamma about the new x.
 
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
@@ -136,7 +146,7 @@ class Pose:
             Pose, single or a batch of N.
 
         Raises:
-            InvalidValueError: If a number is not finite or the counts differ.
+            InvalidValueError: If a number is not finite, or if the arguments have different lengths N.
 
         Source:
             The article's equation (9); scipy's 'ZYX'.
@@ -158,17 +168,18 @@ class Pose:
 
     @classmethod
     def from_quaternion(cls, position: ArrayLike, quaternion: ArrayLike) -> Pose:
-        """A pose from a unit quaternion (x, y, z, w), scalar last.
+        """Create a pose from a unit quaternion (x, y, z, w), scalar last.
 
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
-            quaternion: Unit quaternion, length 1 within 1e-6 (then normalized), shape (4,) or (N, 4).
+            quaternion: Unit quaternion, shape (4,) or (N, 4); a length that differs from 1 by 1e-6 is accepted.
 
         Returns:
             Pose, single or a batch of N.
 
         Raises:
-            InvalidValueError: If a number is not finite, a length is not 1, or the counts differ.
+            InvalidValueError: If a number is not finite, if a quaternion has another length, or if the lengths N
+                differ.
         """
         given = checked(quaternion, "quaternion", "", shape=(4,))
         length = np.linalg.norm(given, axis=-1)
@@ -177,7 +188,7 @@ class Pose:
 
     @classmethod
     def _adopt(cls, position: Array, quaternion: Array) -> Pose:
-        """Pose from arrays that sagline created; they are not copied, and only their lengths are checked."""
+        """Pose from arrays that sagline created. The arrays are not copied, and only their shapes are checked."""
         pose = object.__new__(cls)
         pose._fill(position, quaternion)
         return pose
@@ -199,7 +210,7 @@ class Pose:
     @property
     def rotation(self) -> Rotation:
         """Rotation from platform to world, as a scipy Rotation."""
-        from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
+        from scipy.spatial.transform import Rotation  # the import would take a third of the load time of sagline
 
         return Rotation.from_quat(self.quaternion)
 
@@ -217,15 +228,15 @@ class Pose:
     def transform(self, points: ArrayLike) -> Array:
         """Transform points from the platform frame to the world.
 
-        Every pose transforms every point. If the points depend on the pose, transform them pose by pose:
+        Every pose transforms every point. If each pose has its own points, transform pose by pose:
         `pose[i].transform(points[i])`.
 
         Args:
             points: Coordinates in the platform frame [m], shape (..., 3).
 
         Returns:
-            Coordinates in the world [m]: shape (..., 3) for a single pose, (N, ..., 3) for a batch of N. The
-            coordinates are NaN for a pose without a solution.
+            Coordinates in the world [m]: shape (..., 3) for a single pose, (N, ..., 3) for a batch of N; NaN for a pose
+            without a solution.
 
         Raises:
             InvalidValueError: If a coordinate is not finite, or the last axis is not x, y, z.
@@ -253,13 +264,13 @@ class Pose:
         return batch_length(self.shape, "single pose")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> Pose:
-        """One pose of a batch, or a part of the batch; a slice shares the memory of the batch if possible.
+        """One pose of a batch, or a part of the batch; a slice shares the memory of the batch where possible.
 
         Args:
             index: A number (negative: from the end), a slice, or an array of numbers or of N booleans.
 
         Raises:
-            NoBatchError: If the pose is a single pose (also a TypeError).
+            NoBatchError: If the pose is a single pose; the error is also a TypeError.
             NoSuchEntryError: If a pose does not exist (also an IndexError).
         """
         part = part_of(index, self.shape, "single pose")
@@ -270,15 +281,15 @@ class Pose:
         return (self[i] for i in range(len(self)))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:
-        """Pickle the pose through a constructor, which checks and locks a loaded pose."""
+        """Pickle the pose as a call of a constructor, which checks the loaded arrays and makes them read-only."""
         return Pose.from_quaternion, (self.position, self.quaternion)
 
 
-PoseLike = Pose | Sequence[Pose] | ArrayLike  # an array contains the positions [m] of level poses
+PoseLike = Pose | Sequence[Pose] | ArrayLike  # an array contains positions [m] of poses without rotation
 
 
 def pose_of(value: PoseLike, item: str = "pose") -> Pose:
-    """Convert to poses: a list of poses becomes a batch; positions [m], shape (3,) or (N, 3), become level poses."""
+    """Convert a list of poses to a batch, and positions [m], shape (3,) or (N, 3), to poses without rotation."""
     if not isinstance(value, list | tuple | np.ndarray):
         return instance(value, Pose, item)
     if isinstance(value, list | tuple) and value and all(isinstance(one, Pose) for one in value):
@@ -287,7 +298,7 @@ def pose_of(value: PoseLike, item: str = "pose") -> Pose:
 
 
 def single_pose(value: PoseLike, item: str = "pose") -> Pose:
-    """A single pose, or the level pose at a position [m], shape (3,)."""
+    """Checked single pose; a position [m], shape (3,), is converted to a pose without rotation."""
     pose = pose_of(value, item)
     if pose.shape:
         raise InvalidValueError(item, f"a batch of {len(pose)}", "a single pose", f"Give one of them: {item}[0].")

@@ -1,4 +1,4 @@
-"""The robot: geometry, material of its cables, winches and platform; inertia of simple bodies; changed copies."""
+"""The robot: geometry, cables, winches and platform; inertia of simple bodies; copies of a robot with changes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import brief, choice, instance, label, optional, text, whole_number
 from sagline.core.arrays import Array, exactly, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.fields import given, given_by_name, given_or_none, if_known, reduced
+from sagline.core.fields import given, given_by_name, if_known, reduced
 from sagline.core.results import Shown, set_fields
 from sagline.robot import checks
 from sagline.robot.checks import MOTION_PATTERNS, MotionPattern, freedom_matrix
@@ -25,44 +25,49 @@ from sagline.robot.winch import Winch
 TensionLimitsOf = Literal["chord", "frame_end"]
 
 
+def _given_or_none(value: ArrayLike | None) -> Array:
+    """Converter that returns a value or None unchanged; the check of the field later replaces None by a value."""
+    return value  # type: ignore[return-value]
+
+
 @frozen(eq=False, repr=False, weakref_slot=False)
 class Robot(Shown):
-    """A cable-driven parallel robot. Cable i runs from frame_anchors[i] to platform_anchors[i].
+    """Data of a cable-driven parallel robot. Cable i connects frame_anchors[i] and platform_anchors[i].
 
     Attributes:
         name: Name of the robot.
         frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
-        cables: Material of the cables, one for all or one per cable; fields of shape (m,).
-        winches: Pulleys, dead lengths, drums and motors, one for all cables or one per cable, fields of shape (m,).
-            None if the robot has no winches, and the cables start at the frame anchors.
+        cables: Material of the cables, given once for all cables or per cable; fields of shape (m,).
+        winches: Pulleys, dead lengths, drums and motors, given once for all cables or per cable, fields of shape (m,).
+            None for a robot without winch data, whose cables start at the frame anchors.
         mass: Mass of the platform [kg], > 0.
-        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3). It is positive definite,
-            and no principal moment is larger than the sum of the other two. For a planar pattern, only the moment about
-            plane_normal must be positive. The inertia may be omitted for a pattern without rotation.
+        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3). Must be positive
+            definite, with no principal moment larger than the sum of the two other moments. A planar pattern requires
+            only a positive moment about plane_normal. May be omitted for a pattern without rotation.
         center_of_mass: Center of mass in the platform frame [m], shape (3,).
         gravity: Gravitational acceleration along -z [m/s^2], >= 0.
         motion_pattern: "3R3T", "3T" (point mass), "1R2T" (planar) or "2T" (planar without rotation).
-        plane_normal: Normal of the plane of a planar pattern, world axes, shape (3,), of any nonzero length, stored
-            with length 1; None for the other patterns.
-        tension_min: Lower tension limits [N], >= 0, one for all or one per cable, shape (m,).
-        tension_max: Upper tension limits [N], may be infinite, one for all or one per cable, shape (m,).
+        plane_normal: Normal of the plane of a planar pattern, world axes, shape (3,), of any nonzero length, and
+            normalized by the constructor; None for the other patterns.
+        tension_min: Lower tension limits [N], >= 0, given once for all cables or per cable, shape (m,).
+        tension_max: Upper tension limits [N], may be infinite, given once for all cables or per cable, shape (m,).
         tension_limits_of: Tension to which the limits apply, "chord" or "frame_end".
         platform_size: Edges of the platform, for drawing [m], shape (3,), or None.
         frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
-        test_box: Box of poses, or None; almost all of its poses are wrench-feasible.
-        source: Source of the numbers.
-        assumed: Field name -> reason, for each field whose values are not from the source.
+        test_box: Box of poses from which tests and examples take poses, almost all wrench-feasible; or None.
+        source: Publication or document from which the numbers are taken.
+        assumed: Reasons for values that are not from `source`, by field name.
         notes: Further remarks for users.
-        tolerances: Standard deviations of quantities of the robot, by name, in SI units, > 0, from a drawing or data
-            sheet; infinite if unknown. A deviation is one number for the whole field, one number per axis for a
+        tolerances: Standard deviations of quantities before a calibration, by name, in SI units, > 0, for example from
+            a data sheet; infinite if unknown. A deviation is one number for the whole field, one number per axis for a
             quantity with three components, or an array of the shape of the field. Names: frame_anchors,
             platform_anchors, center_of_mass (with three components each), mass, and per cable length_zero, drum_radius,
             linear_density, axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
-        calibration: Calibration that identified some of the values, and their standard errors; or None.
+        calibration: Origin and standard errors of values that a calibration has identified; or None.
 
     Raises:
-        InvalidValueError: If a field is wrong; the message names it, with its index.
+        InvalidValueError: If a field is wrong; the message names the field and the index of the wrong value.
 
     Examples:
         >>> import numpy as np
@@ -85,7 +90,7 @@ class Robot(Shown):
     cables: Cable
     winches: Winch | None = field(default=None, kw_only=True)
     mass: float
-    inertia: Array = field(default=None, converter=given_or_none)
+    inertia: Array = field(default=None, converter=_given_or_none)
     center_of_mass: Array = field(default=(0.0, 0.0, 0.0), kw_only=True, converter=given)
     gravity: float = field(default=9.81, kw_only=True)
     motion_pattern: MotionPattern = field(default="3R3T", kw_only=True)
@@ -103,7 +108,7 @@ class Robot(Shown):
     calibration: Provenance | None = field(default=None, kw_only=True)
 
     def __attrs_post_init__(self) -> None:
-        """Check every field, and expand a value for all cables to one value per cable."""
+        """Check every field. A single value for all cables is expanded to one value per cable."""
         frame, platform = checks.anchors(self.frame_anchors, self.platform_anchors)
         pattern = choice(self.motion_pattern, "motion_pattern", MOTION_PATTERNS)
         normal = checks.plane_normal(self.plane_normal, pattern)
@@ -148,19 +153,19 @@ class Robot(Shown):
 
     @property
     def freedom(self) -> Array:
-        """Matrix that selects the free motions from a wrench or twist in world axes, shape (n, 6), orthonormal rows."""
+        """Matrix (n, 6) with orthonormal rows that selects the free motions of a wrench or twist in world axes."""
         return freedom_matrix(self.motion_pattern, self.plane_normal)
 
     def replace(self, **changes: Any) -> Robot:
-        """A robot with some fields changed, checked like a new one.
+        """Copy of the robot with some fields changed; the constructor checks the copy.
 
-        The tolerances remain unchanged. The standard errors of replaced values are removed from the calibration.
+        Tolerances are unchanged. Standard errors of the replaced values are removed from `calibration`.
 
         Args:
             changes: Fields of `Robot` and their new values.
 
         Returns:
-            A new robot; this one remains unchanged.
+            New robot; the original robot is unchanged.
 
         Raises:
             InvalidValueError: If a field does not exist, or the constructor does not accept the new values.
@@ -179,19 +184,18 @@ class Robot(Shown):
         return evolve(self, **changes)._kept(self) if "calibration" not in changes else evolve(self, **changes)
 
     def with_payload(self, mass: float, *, at: ArrayLike | None = None) -> Robot:
-        """A robot with a payload on its platform.
+        """Copy of the robot with a payload on the platform.
 
         Args:
             mass: Mass of the payload [kg], >= 0.
-            at: Place of the payload in the platform frame [m], a point, shape (3,). None: the payload is distributed
-                like the mass of the platform. The inertia then increases in proportion to the mass, and the center of
-                mass does not move.
+            at: Position of the payload, a point mass, in the platform frame [m], shape (3,). None: the payload has the
+                same mass distribution as the platform, so that the inertia increases in proportion to the mass.
 
         Returns:
-            A new robot; this one remains unchanged.
+            New robot; the original robot is unchanged.
 
         Raises:
-            InvalidValueError: If the mass is negative, or the place is not three numbers.
+            InvalidValueError: If the mass is negative, or `at` is not three numbers.
 
         Examples:
             >>> import sagline as sl
@@ -204,13 +208,13 @@ class Robot(Shown):
             return self.replace(mass=whole, inertia=self.inertia * (whole / self.mass))
         lever = exactly(at, "at", "m", (3,)) - self.center_of_mass
         share = mass / whole
-        # parallel axis theorem for two masses about their common center, with the reduced mass
+        # parallel axis theorem for two bodies about their common center of mass, with the reduced mass
         added = share * self.mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
         center = self.center_of_mass + share * lever
         return self.replace(mass=whole, inertia=self.inertia + added, center_of_mass=center)
 
     def _kept(self, before: Robot) -> Robot:
-        """This robot without the standard errors of values that have changed since the calibration."""
+        """Robot without the standard errors of values that have changed since the robot `before`."""
         if self.calibration is None:
             return self
         errors = self.calibration.standard_error
@@ -223,30 +227,30 @@ class Robot(Shown):
 
 
 def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
-    """Inertia of a solid box about its center of mass [kg m^2], (3, 3); x, y, z: edges along the platform axes [m]."""
+    """Inertia (3, 3) of a solid box about its center of mass [kg m^2]; x, y, z: edge lengths [m]; mass [kg]."""
     return np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) * (mass / 12.0)
 
 
 def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
-    """Inertia of a solid cylinder along z about its center of mass [kg m^2], (3, 3); mass [kg], radius, height [m]."""
+    """Inertia (3, 3) of a solid cylinder about its center of mass [kg m^2]; the axis is z; mass [kg], lengths [m]."""
     across = (3.0 * radius * radius + height * height) / 12.0
     return np.diag([across, across, 0.5 * radius * radius]) * mass
 
 
 def with_mass(robot: Robot, mass: float) -> Robot:
-    """Copy of a robot with another mass [kg], payload included; the inertia is scaled in proportion."""
+    """Copy of a robot with the platform mass `mass` [kg]; the inertia changes in proportion to the mass."""
     return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))
 
 
 def without_cables(robot: Robot, *cables: int) -> Robot:
-    """Robot after the failure of some cables. The weight of these cables on the platform is also removed.
+    """Robot after the failure of some cables. The broken cables do not load the platform with their weight.
 
     Args:
         robot: The robot before the failure.
         cables: Indices of the broken cables, 0 to m - 1.
 
     Returns:
-        A robot with the remaining cables, in their order; all other data are unchanged.
+        Robot with the remaining cables in the same order; all other data are unchanged.
 
     Raises:
         InvalidValueError: If an index is out of range, or no cable remains.
@@ -273,7 +277,7 @@ def without_cables(robot: Robot, *cables: int) -> Robot:
 
 
 def with_quantities(robot: Robot, values: Mapping[str, Array]) -> Robot:
-    """Robot with other values of some quantities of `UNCERTAIN`; winches are added if a quantity belongs to them."""
+    """Copy of a robot with the `values` of quantities in `UNCERTAIN`; winches are added if the values need them."""
     owned: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         owner, _, field = UNCERTAIN[name].place.rpartition(".")

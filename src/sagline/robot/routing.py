@@ -1,12 +1,12 @@
-"""Routing between exit points and drums: friction, and catenary spans between guides.
+"""Routing of cables between exit points and drums: friction, and catenaries between guides.
 
-Kernels model this routing as a straight, guided cable without friction, also for energy and stiffness. This module
-computes the difference of unstrained length between the actual routing and this model; docs/model.md, section 10.
+For lengths, energy and stiffness, the kernels assume a straight guided cable without friction between exit point and
+drum. This module computes the difference between actual and assumed unstrained length. See docs/model.md, section 10.
 
 With friction, the tensions on the two sides of a bend of angle psi differ by the factor exp(mu psi), and the bearing of
-the pulley takes the share f of the tension. Both effects increase the tension toward the drum while winding in. The
-weight of the cable on the pulley is included to first order, as without friction. Between guides a cable is a catenary.
-The tension of its far end follows from T + T^2/(2 EA) - w z, which is constant along a cable without friction.
+the pulley takes the share f of the tension. While a drum winds in, both effects increase the tension at the drum. The
+weight of the cable on the pulley is included to first order. Between guides, a cable is a catenary. Along a cable
+without friction, T + T^2/(2 EA) - w z is constant, which gives the tension at the other end.
 """
 
 from __future__ import annotations
@@ -21,22 +21,23 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.models import Catenary, Elastic
 from sagline.core.arrays import LARGEST, Array, Flags, Indices, locked
 from sagline.kernels import codes
+from sagline.robot.batch import refuse_slanted
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
-# iterations between bend angles and tensions, which depend on each other; each adds at least one correct digit
+# Bend angles and tensions depend on each other. Each iteration adds at least one correct digit to both.
 PASSES: Final = 40
 STEPS: Final = 60  # iterations of Newton's method for one span
-_TOLERANCE: Final = 1e-15  # relative change of a length
-_TENSION_TOLERANCE: Final = 1e-14  # relative change of a tension
+_TOLERANCE: Final = 1e-15  # relative change of a length at convergence
+_TENSION_TOLERANCE: Final = 1e-14  # relative change of a tension at convergence
 _BALANCED: Final = 1e-12  # relative tolerance of tensions
 _STEP: Final = 1e-6  # relative step of the tension for its numerical derivative
 _TINY: Final = 1e-300
 
 
-# Unstrained length of the cables on the pulleys [m]; their unstrained length between pulleys and drums [m], NaN if a
-# cable is too slack for a catenary; and their tension at the drums [N]; all (N, m)
+# Three arrays (N, m): unstrained length of the cables on the pulleys [m]; unstrained length between pulleys and drums
+# [m], NaN for a cable that is too slack for a catenary; tension at the drums [N].
 _Routing: TypeAlias = tuple[Array, Array, Array]
 
 
@@ -44,25 +45,25 @@ class _ExitState(NamedTuple):
     """State of K cables at their exit points, arrays of shape (K,)."""
 
     tension: Array  # T_A at the exit point P [N]
-    weight: Array  # w [N/m]; 0 if the cable model has no weight between P and the drum
+    weight: Array  # w [N/m]; 0 for a cable model without weight between P and the drum
     stiffness: Array  # EA [N]
     wrap: Array  # psi [rad]
     sine: Array  # sin psi
     tangent: Array  # unit tangent at P, toward the platform, shape (K, 3)
     radius: Array  # R [m]
-    entry: Array  # +1 if a cable enters from below, -1 if from above
-    friction: Array  # mu, with the sign of the winding
+    entry: Array  # +1 for a cable that enters its pulley from below, -1 from above
+    friction: Array  # mu; negative while paying out, 0 at rest
     rolling: Array  # 1 + f while winding in, 1 - f while paying out, 1 at rest
 
     def entering(self, bend: Array) -> Array:
-        """Tension [N] on the drum side of the pulley, after an additional bend [rad] at the frame anchor."""
+        """Tension [N] on the drum side of the pulley, if the cable has an additional bend [rad] at the frame anchor."""
         rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
         drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
-        return _tension_after(rubbed, drop, self.stiffness)
+        return tension_after(rubbed, drop, self.stiffness)
 
 
 def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
-    """True if the routing differs from a straight guided cable without friction; winding: +1, -1 and 0, or None."""
+    """True if guides, or friction with the directions `winding`, make lengths differ from lengths of the kernels."""
     winches = [one.winches for one in ((robot,) if isinstance(robot, Robot) else robot) if one.winches is not None]
     rubs = winding is not None and bool(winding.any())
     return any(
@@ -72,10 +73,10 @@ def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
 
 
 def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
-    """Equilibrium with the lengths of the actual routing between exit points and drums.
+    """Equilibrium in which lengths include guides and friction between exit points and drums.
 
-    winding: +1 winding in, -1 paying out, 0 at rest, (m,) or (N, m); None: no friction. The lengths are NaN for a cable
-    that is too slack for a catenary between its guides. Without guides and friction, `state` is returned.
+    winding: +1 winding in, -1 paying out, 0 at rest, (m,) or (N, m); None for no friction. The length is NaN for a
+    cable that is too slack for a catenary between guides. Without guides and friction, `state` itself is returned.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -88,7 +89,7 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
 
 
 def kernel_length(state: Equilibrium) -> Array:
-    """Unstrained lengths of straight guided cables, for the kernels [m]."""
+    """Unstrained lengths [m] that the kernels use, which are lengths of straight guided cables without friction."""
     contact = state.contact
     if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
         return state.unstrained_length
@@ -98,12 +99,12 @@ def kernel_length(state: Equilibrium) -> Array:
 
 
 def actual_routing(state: Equilibrium) -> _Routing:
-    """The actual routing with guides, and with friction if the contact of `state` has winding directions."""
+    """Lengths and tensions of the routing with guides, and with friction if `state` has winding directions."""
     return _routing(state, guided=False)
 
 
 def _routing(state: Equilibrium, *, guided: bool) -> _Routing:
-    """Compute the routing, separately for each of several robots; guided: True for straight guided cables."""
+    """Lengths and tensions of the routing; guided: True for straight guided cables in place of catenaries."""
     if isinstance(state.robot, Robot):
         return _routing_of_robot(state, state.robot, guided=guided)
     parts = [_routing_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
@@ -116,7 +117,8 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
     assert contact is not None
     if winches is None or not winches.anything_behind:
         return np.zeros(shape), np.zeros(shape), _exit_tension(state)
-    # a cable that does not stretch has the same length with and without friction
+    refuse_slanted(robot)
+    # friction does not change the length of a cable that does not stretch
     if state.cables.model.code == codes.STRAIGHT:
         dead = np.broadcast_to(winches.dead_cable, shape)
         return winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state)
@@ -137,7 +139,7 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
 
 
 def _exit_tension(state: Equilibrium) -> Array:
-    """Tensions at the exit points P in the cable model [N]. They vary along the cable only in the exact model."""
+    """Tensions [N] at the exit points P: frame-end tensions in the exact model, chord tensions in all other models."""
     cables = state.cables
     return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
 
@@ -169,8 +171,8 @@ def _exit_state(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, 
     )
 
 
-def _tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
-    """Tension [N] at a point where (1 + strain)^2 is smaller by a given drop; T + T^2/(2 EA) - w z is constant."""
+def tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
+    """Tension [N] at another point of a cable, where (1 + strain)^2 is smaller by `drop` than for `tension`."""
     strain = tension / stiffness
     gained = strain * (2.0 + strain) - drop  # (1 + strain)^2 - 1
     with np.errstate(invalid="ignore"):
@@ -185,31 +187,32 @@ def _wrapped_length(at: _ExitState) -> Array:
     falls = at.entry * beta * (1.0 - np.cos(at.wrap) - at.wrap * at.sine)
     rubs = at.friction != 0.0
     friction = np.where(rubs, at.friction, 1.0)
-    # ln((1 + e exp(mu psi))/E)/mu with friction; psi e/E without
+    # with friction: ln((1 + e exp(mu psi))/E)/mu; without friction: psi e/E
     stretched = np.log1p(strain / strained * np.expm1(friction * at.wrap)) / friction
     stretched = np.where(rubs, stretched, at.wrap * strain / strained)
     return np.asarray(at.radius * (at.wrap - stretched - falls / strained**3))
 
 
 def _straight_run(at: _ExitState, length: Array, rise: Array) -> tuple[Array, Array]:
-    """Unstrained length of straight guided cables [m], and the tension at the drum [N]."""
+    """Unstrained length of straight guided cables between pulley and drum [m], and tension at the drum [N]."""
     first = at.entering(np.zeros(1))
-    last = _tension_after(first, 2.0 * at.weight * rise / at.stiffness, at.stiffness)
+    last = tension_after(first, 2.0 * at.weight * rise / at.stiffness, at.stiffness)
     return 2.0 * length / (2.0 + (first + last) / at.stiffness), last
 
 
 def _guided_spans(
     at: _ExitState, points: Array, winches: Winch, robot: Robot, model: CableModel, cable: Indices
 ) -> tuple[Array, Array]:
-    """Unstrained length between pulley and drum [m], and tension at the drum [N]; points (K, k + 1, 3), starting at A.
+    """Unstrained length between pulley and drum [m], and tension at the drum [N], of cables with guides.
 
-    Tensions and bend angles depend on each other. Iterations compute them alternately.
+    points: frame anchors A and guides, in the order toward the drum, (K, k + 1, 3) [m]. Tensions and bend angles depend
+    on each other, and are computed alternately until convergence.
     """
     hanging = Catenary() if model.code == codes.CATENARY else Elastic()
     material = Cable(robot.cables.linear_density[cable], robot.cables.axial_stiffness[cable])
     axis, eyelet = winches.swivel_axis[cable], at.radius == 0.0
-    # an eyelet at the frame anchor bends the cable from the drum-side span to its exit direction; at a pulley, the span
-    # begins along the swivel axis
+    # An eyelet at the frame anchor bends the cable between the direction of the last span and the exit direction. At a
+    # pulley, the span meets the direction of the swivel axis.
     onward = np.where(eyelet[:, None], at.tangent, axis)
     at = at._replace(wrap=np.where(eyelet, 0.0, at.wrap))
     steps = points[:, :-1] - points[:, 1:]
@@ -234,10 +237,10 @@ def _guided_spans(
 
 
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
-    """Catenaries over steps (K, 3) with given tension at the upper ("platform") ends; NaN if there is no solution.
+    """Catenaries over the vectors `step` (K, 3) [m] with `tension` [N] at the platform-side ends; NaN if impossible.
 
-    As the chord tension grows, the upper tension first falls to a minimum and then rises. No catenary has a smaller
-    upper tension than this minimum.
+    If the chord tension grows, the tension at the end first decreases to a minimum and then increases. Catenaries with
+    a smaller end tension than this minimum do not exist.
     """
     level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
     weight = 0.0 if model.weightless else cable.linear_density * gravity
@@ -267,7 +270,7 @@ def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity:
 
 
 def _tangents(span: CableState, step: Array) -> tuple[Array, Array]:
-    """Unit tangents of catenaries at both ends of a step, in the direction of the platform."""
+    """Unit tangents at both ends of catenaries over the vectors `step`; the tangents point toward the platform."""
     level = np.hypot(step[:, 0], step[:, 1])[:, None]
     outward = step[:, :2] / np.maximum(level, _TINY)
 
@@ -279,5 +282,5 @@ def _tangents(span: CableState, step: Array) -> tuple[Array, Array]:
 
 
 def _angle(one: Array, other: Array) -> Array:
-    """Angles between unit vectors (K, 3)."""
+    """Angles (K,) [rad] between the unit vectors `one` and `other`, both (K, 3)."""
     return np.asarray(2.0 * np.arctan2(np.linalg.norm(one - other, axis=-1), np.linalg.norm(one + other, axis=-1)))

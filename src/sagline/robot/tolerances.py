@@ -1,4 +1,4 @@
-"""Tolerances of the quantities of a robot: names, units and shapes; calibrations that identified quantities."""
+"""Tolerances of a robot's quantities, and provenance of quantities that a calibration has identified."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from sagline.core.results import set_fields
 
 
 class _Uncertain(NamedTuple):
-    """An uncertain quantity of a robot."""
+    """Description of a robot's quantity that can have a tolerance."""
 
-    place: str  # attribute of the robot, with dots
-    unit: str  # its unit in SI
+    place: str  # path of the attribute in the robot, such as "cables.linear_density"
+    unit: str  # SI unit of the quantity
     each: bool = True  # True if every cable has its own value
-    axes: bool = False  # True for three components, along x, y and z
+    axes: bool = False  # True for a quantity with components along x, y and z
     share: bool = False  # True if a file may state the tolerance in percent of the value
 
     def shape(self, cables: int) -> tuple[int, ...]:
-        """Shape of the quantity in a robot with a given number of cables."""
+        """Shape of the quantity in a robot with `cables` cables."""
         return (*((cables,) if self.each else ()), *((3,) if self.axes else ()))
 
 
@@ -53,10 +53,10 @@ UNCERTAIN: Final[Mapping[str, _Uncertain]] = MappingProxyType(
 def deviations(
     given: Any, item: str, cables: int, *, low: float = -np.inf, above: float = -np.inf
 ) -> Mapping[str, Array]:
-    """Standard deviations of quantities of `UNCERTAIN`, each in the shape of its field, in the given order.
+    """Checked standard deviations of quantities in `UNCERTAIN`, each expanded to the shape of the quantity.
 
-    given: one number for the whole field, three numbers (x, y, z) for a quantity with three components, or an array of
-    the shape of the field; infinite if unknown; low, above: limits of the deviations.
+    given: dictionary from quantity names to deviations (infinite if unknown). A deviation is one number, three numbers
+    for the axes x, y, z, or an array of the shape of the quantity. low, above: limits of the deviations.
     """
     if not isinstance(given, Mapping):
         allowed = "names of fields and standard deviations"
@@ -75,7 +75,7 @@ def deviations(
 
 
 def value_of(robot: object, name: str) -> Array | None:
-    """Value of the robot's quantity `name` in SI units, in the shape of its field; None if the robot has none."""
+    """Value of the robot's quantity `name` in SI units; None if the robot does not have this quantity."""
     found: Any = robot
     for part in UNCERTAIN[name].place.split("."):
         found = None if found is None else getattr(found, part)
@@ -83,7 +83,7 @@ def value_of(robot: object, name: str) -> Array | None:
 
 
 def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
-    """Standard deviation, in the unit and the shape of the quantity, from the relative deviation `share`."""
+    """Standard deviation in the unit of the quantity: relative deviation `share` times `value`."""
     if value is None:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
     array = checked(share, item, "%")
@@ -95,13 +95,13 @@ def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
 
 @frozen(eq=False, weakref_slot=False)
 class Provenance:
-    """Calibration by which some values of a robot were identified.
+    """Origin of values that a calibration has identified: log, date and standard errors.
 
     Attributes:
-        log: The winch log that it used.
+        log: Text that names the winch log of the calibration.
         date: Date of the calibration as an ISO 8601 text, such as "2026-03-01".
-        standard_error: Standard errors of the identified quantities, by name (as in `Robot.tolerances`), in the shape
-            and SI unit of the field; infinite without observations and prior.
+        standard_error: Standard errors of the identified quantities, by the names of `Robot.tolerances`, in SI units,
+            in the shape of the quantity; infinite without observations and prior.
         note: Further remarks for users.
 
     Raises:
@@ -114,7 +114,7 @@ class Provenance:
     note: str = ""
 
     def __attrs_post_init__(self) -> None:
-        """Check the fields; `Robot` checks names and shapes."""
+        """Check the fields. `Robot` also checks the names and shapes of the standard errors."""
         given: Any = self.standard_error  # a caller without type checks may pass anything
         if not isinstance(given, Mapping):
             allowed, step = "names of fields and standard errors", 'Give {"frame_anchors": 0.001}, in SI.'
@@ -128,7 +128,7 @@ class Provenance:
         )
 
     def _of(self, cables: int) -> Provenance:
-        """Copy in which every standard error has the shape of its field for the given number of cables."""
+        """Copy in which every standard error has the shape of its quantity in a robot with `cables` cables."""
         errors = deviations(self.standard_error, "calibration: standard_error", cables, low=0.0)
         return Provenance(self.log, self.date, errors, self.note)
 

@@ -1,4 +1,4 @@
-"""The winch from encoder to cable: motor, gear, drum, dead length and pulley."""
+"""Data of winches: motor, encoder, gear, drum, dead length and pulley."""
 
 from __future__ import annotations
 
@@ -9,72 +9,73 @@ from attrs import Attribute, evolve, field, fields_dict, frozen
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.core.arguments import choice, whole_number
-from sagline.core.arrays import SMALLEST, Array, checked, locked, refuse_first, spread
+from sagline.core.arrays import SMALLEST, Array, Flags, checked, locked, refuse_first, spread
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.memory import check_memory
 from sagline.robot.pose import unit
 
 UPRIGHT: Final = 1e-9  # sine of the largest angle between a swivel axis and the vertical
-# largest relative difference between a given dead length and the dead length that follows from the guides
+# largest relative difference between a given dead length and the sum of the distances between guides
 _AGREEING: Final = 1e-9
 MOST_LAYERS: Final = 1000
-LARGEST_PULLEY: Final = 10.0  # [m], above the largest sheaves of mine hoists and cable cars
-MOST_NAMED: Final = 3  # largest number of fields in a message
-# number of array axes that a field has for one cable, if its value is not a single number
+LARGEST_PULLEY: Final = 10.0  # [m], larger than the sheaves of mine hoists and cable cars
+MOST_NAMED: Final = 3  # largest number of fields that a message lists
+# number of array axes of a field's value for one cable, if the value is not a single number
 _AXES: Final = {"swivel_axis": 1, "guides": 2}
 
 
 @frozen(eq=False, weakref_slot=False)
 class Winch:
-    """One winch with its pulley, or the winches of all cables. All given fields have one shape, () or (m,).
+    """One winch with its pulley, or the winches of all cables. All known fields have the same shape, () or (m,).
 
-    None means that a value is unknown. A function that needs an unknown value raises an error that names the field.
-
-    A cable ends at its platform anchor. A cable that runs over a pulley on the platform and back to the frame is not
-    modeled.
+    A field that is None is unknown. A function that needs an unknown field raises an error with the name of the field.
+    The model does not include cables that run over a pulley on the platform and back to the frame.
 
     Attributes:
-        pulley_radius: Radius of the pulley at the frame, to the centerline of the cable [m], 0 to 10; 0 for an eyelet.
-            The pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
-        swivel_axis: Unit vector of the cable's direction at the entry of the pulley, from drum to pulley, shape (...,
-            3): up (0, 0, 1) for a drum below, or down (0, 0, -1).
+        pulley_radius: Radius of the pulley at the frame, measured to the centerline of the cable [m], 0 to 10; 0 for an
+            eyelet. The cable enters the pulley at the frame anchor, and the pulley swivels about the swivel axis, which
+            passes through the frame anchor.
+        swivel_axis: Unit vector of shape (..., 3) in the direction in which the cable enters the pulley, world axes: up
+            (0, 0, 1) for a drum below the pulley, down (0, 0, -1), or any other direction. With another direction,
+            `inverse`, `forward`, `confirm`, `stiffness` and `modes` compute the robot, with the models `Catenary` and
+            `Elastic` and without friction; functions that do not support it refuse it.
         pulley_friction: Friction coefficient mu of the cable on the pulley and at the guides. The tensions on the two
             sides of a bend of angle psi differ by the factor exp(mu psi). The tension is larger on the side toward
-            which the cable moves. Friction acts only if the direction of `winding` is given, as in `inverse` and
-            `forward`.
+            which the cable moves. Friction is included only if the argument `winding` of a function, such as `inverse`
+            or `forward`, is given.
         rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1. On the drum side of the
             pulley, the tension is multiplied by 1 + f while winding in and by 1 - f while paying out.
-        dead_cable: Length of the straight guided cable from drum to pulley [m], >= 0. If the point where the cable
-            leaves the drum moves along the drum, this is the length while that point is opposite the first pulley. With
-            guides, the robot computes it as the sum of the distances.
-        dead_rise: Height of the pulley's entry above the drum [m], at most dead_cable in magnitude; negative below the
-            drum. With guides, the robot computes it.
+        dead_cable: Length of the straight guided cable between drum and pulley [m], >= 0. If drum_distance is given,
+            the cable leaves the drum at a moving point; dead_cable is then the length for the point opposite to the
+            first pulley. If guides are given, the robot computes dead_cable as the sum of the distances.
+        dead_rise: Height of the pulley's entry above the drum [m], negative for a pulley below the drum, at most
+            dead_cable in magnitude. If guides are given, the robot computes dead_rise.
         guides: Eyelets, or pulleys small enough to be points, along the cable from the drum to the frame anchor, world
-            axes [m], shape (..., k, 3). The first guide is the point where the cable leaves the drum. The frame anchor
-            is not one of the guides. Between two guides the cable is a free catenary. None: the whole dead length is
-            guided. Stiffness and sensitivities use a straight guided cable of the same length.
+            axes [m], shape (..., k, 3). The first guide is the point at which the cable leaves the drum. The frame
+            anchor is not a guide. Between two guides, the cable is a free catenary. None: the whole dead length is
+            guided. Stiffness and sensitivities assume a straight guided cable of the same length.
         drum_radius: Radius of the drum to the surface under the cable [m]; None if the drum is not known.
-        drum_width: Usable width along the drum axis [m], >= groove_pitch; a layer has drum_width/groove_pitch turns,
-            not necessarily a whole number. None: the drum is wide enough for all cable in one layer.
+        drum_width: Usable width along the drum axis [m], >= groove_pitch. A layer has drum_width/groove_pitch turns,
+            which need not be a whole number. None: one layer is wide enough for the whole cable.
         groove_pitch: Distance between adjacent turns along the drum axis [m].
         layers: Largest possible number of layers on the drum, a whole number from 1 to 1000.
         drum_distance: Distance from the drum to the first pulley, perpendicular to the drum axis [m]; None: the cable
             leaves the drum at a fixed point.
-        drum_offset: Axial position of the first groove, where the cable leaves the empty drum, relative to the center
-            of the first pulley [m]. The grooves of the first layer continue in the positive direction. Use
-            -drum_width/2 for a drum whose center is opposite the pulley.
-        gear: Encoder turns per drum turn, not zero; negative if counts decrease while cable is paid out.
+        drum_offset: Position of the first groove along the drum axis, relative to the center of the first pulley [m].
+            The cable leaves the empty drum at the first groove. The next grooves are in the positive direction. Use
+            -drum_width/2 if the center of the drum is opposite to the pulley.
+        gear: Encoder turns per drum turn, not zero; negative if counts decrease while the winch pays out.
         counts_per_turn: Encoder counts per encoder turn.
         count_zero: Encoder counts at which the length off the drum is length_zero.
-        length_zero: Length of cable off the drum at count_zero, at the winding tension, including dead_cable [m];
-            `home` determines it.
-        cable_length: Total length of the cable, on and off the drum, at the winding tension [m]; at least dead_cable.
+        length_zero: Length of cable off the drum at count_zero, at the winding tension, including dead_cable [m]. The
+            function `home` determines length_zero.
+        cable_length: Length of the whole cable, on and off the drum, at the winding tension [m]; at least dead_cable.
         winding_tension: Tension of the cable on the drum [N], >= 0.
         inertia: Moment of inertia of motor, gear and drum at the motor's shaft [kg m^2].
         torque_limit: Largest torque of the motor at its shaft [N m].
         speed_limit: Largest speed of the motor's shaft [rad/s].
-        friction: Friction of the whole drive, as a force on the cable where it leaves the drum [N], >= 0.
+        friction: Friction of the whole drive, as an equivalent force on the cable at the drum [N], >= 0.
         position_gain: k_p of the drive's position loop, referred to the cable [1/s].
         speed_gain: k_v of the drive's speed loop, referred to the cable [N s/m].
         integral_gain: k_i of the drive's speed loop, referred to the cable [N/m].
@@ -83,13 +84,14 @@ class Winch:
         load_cell_bias: Measured value without load [N].
         load_cell_gain: Measured value per newton of load.
 
-    All fields are in SI, one number for all cables or one per cable. A swivel axis may have any nonzero length. Guides
-    have the shape (k, 3) for all cables or (m, k, 3), k >= 1. With guides, do not give dead_cable and dead_rise.
+    All fields are in SI units, one number for all cables or one number per cable. A swivel axis may have any nonzero
+    length. Guides have the shape (k, 3) for all cables or (m, k, 3), k >= 1. With guides, omit dead_cable and
+    dead_rise.
 
     Raises:
-        InvalidValueError: If a value is out of its range, the dead rise exceeds the dead length, the dead length
-            exceeds the total length, a gear is zero, a swivel axis is not vertical, two consecutive guides coincide, or
-            the shapes do not fit.
+        InvalidValueError: If a value is out of its range, or the shapes do not fit; if the dead rise exceeds the dead
+            length, or the dead length exceeds the cable length; if a gear or a swivel axis is zero, or two consecutive
+            guides coincide.
 
     Examples:
         >>> import sagline as sl
@@ -98,7 +100,7 @@ class Winch:
         array([0.05, 0.05])
     """
 
-    __slots__: ClassVar[tuple[str, ...]]  # names of the fields, in order
+    __slots__: ClassVar[tuple[str, ...]]  # field names in the order of the constructor
 
     pulley_radius: Array = field(default=0.0, converter=given, metadata=rule("m", low=0.0))
     swivel_axis: Array = field(default=(0.0, 0.0, 1.0), kw_only=True, converter=given, metadata=rule(shape=(3,)))
@@ -132,7 +134,7 @@ class Winch:
     load_cell_gain: Array = field(default=1.0, kw_only=True, converter=given, metadata=rule(above=0.0))
 
     def __attrs_post_init__(self) -> None:
-        """Check every field, and expand all known fields to one shape."""
+        """Check every field, and expand all known fields to a common shape."""
         values = {
             name: _checked(value, about)
             for name, about in _FIELDS.items()
@@ -146,25 +148,30 @@ class Winch:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of all known fields, () or (m,)."""
+        """Common shape of all known fields, () or (m,)."""
         return self.pulley_radius.shape
 
     @property
     def anything_behind(self) -> bool:
-        """True if any cable has a pulley or a dead length. Dead lengths from guides are known only in a robot."""
+        """True if any cable has a pulley or a dead length; the dead length of guides is known only in a robot."""
         return bool(self.pulley_radius.any() or self.dead_cable.any())
 
+    @property
+    def slanted(self) -> Flags:
+        """True for each pulley whose swivel axis is not vertical; False for an eyelet, whose axis has no effect."""
+        return np.asarray(self.swivel_axis[..., :2].any(axis=-1) & (self.pulley_radius > 0.0))
+
     def per_cable(self, count: int) -> Winch:
-        """The winches of a given number of cables, one value per cable.
+        """Copy of the winch data for `count` cables, with one value per cable in every field.
 
         Args:
             count: Number of cables m.
 
         Returns:
-            Winch with fields of shape (m,).
+            Winch with known fields of shape (m,).
 
         Raises:
-            InvalidValueError: If the fields have another length, or the count is not a whole number >= 1.
+            InvalidValueError: If the fields have values for other numbers of cables, or if `count` is not >= 1.
         """
         count = whole_number(count, "count", 1)
         check_memory("winches", 8.0 * (len(_FIELDS) - len(_AXES)) * count, "Give fewer cables.")
@@ -179,24 +186,28 @@ class Winch:
         )
 
     def _long(self) -> str:
-        """Names of the fields that differ among the cables, for a message; all fields have one shape."""
-        differ = [name for name, field in self.known().items() if (field != field[0]).any()]
+        """Part of a message: names of the fields whose values differ between cables, or are slanted axes."""
+        differ = [
+            name
+            for name, field in self.known().items()
+            if (field != field[0]).any() or (name == "swivel_axis" and self.slanted.any())
+        ]
         if not differ:
             return "winches"
         return f"winches: {', '.join(differ[:MOST_NAMED])}{', ...' if len(differ) > MOST_NAMED else ''}"
 
     def _part(self, index: NDArray[Any]) -> Winch:
-        """The winches of some cables; these winches have fields of shape (m,)."""
+        """Winches of the cables that `index` selects; the fields must have the shape (m,)."""
         return self.replace(**{name: field[index] for name, field in self.known().items()})
 
     def replace(self, **changes: Any) -> Winch:
-        """A winch with some fields changed, checked like a new one.
+        """Copy of the winch with some fields changed; the constructor checks the copy.
 
         Args:
             changes: Fields of `Winch` and their new values.
 
         Returns:
-            A new winch; this one remains unchanged.
+            New winch; the original winch is unchanged.
 
         Raises:
             InvalidValueError: If a field does not exist, or the constructor does not accept the new values.
@@ -210,11 +221,11 @@ class Winch:
         for name in changes:
             choice(name, "field", self.__slots__)
         if self.guides is not None and changes.get("guides") is not None:
-            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # the robot computes dead length and rise again
+            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # computed again by the robot
         return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
-        """Copy whose dead lengths are computed from the guides and the frame anchors (m, 3) [m] after them."""
+        """Copy with dead lengths, measured from the drums along the guides to `frame_anchors` (m, 3) [m]."""
         if self.guides is None:
             return self
         points = np.concatenate((self.guides, frame_anchors[:, None]), axis=1)
@@ -223,8 +234,8 @@ class Winch:
         if (same := spans[:, -1] < SMALLEST).any():
             item = f"winches: guides[{int(np.argmax(same))}, {self.guides.shape[1] - 1}]"
             step = "List the guides in order, starting at the drum, without the frame anchor."
-            raise InvalidValueError(item, "at the frame anchor", "points before it", step)
-        # at most the length, despite rounding
+            raise InvalidValueError(item, "at the frame anchor", "a point before the frame anchor", step)
+        # rounding must not make the rise larger than the length
         rise = np.clip(frame_anchors[:, 2] - self.guides[:, 0, 2], -length, length)
         for name, own, follows in (("dead_cable", self.dead_cable, length), ("dead_rise", self.dead_rise, rise)):
             if (wrong := (own != 0.0) & (np.abs(own - follows) > _AGREEING * length)).any():
@@ -234,27 +245,27 @@ class Winch:
         return evolve(self, dead_cable=length, dead_rise=rise)
 
     def known(self) -> dict[str, Array]:
-        """Known fields, by name, in order.
+        """Names and values of the known fields, in the order of the constructor.
 
         Returns:
-            The fields that are not None.
+            Dictionary of the fields that are not None.
         """
         return {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
 
     __reduce__ = reduced
 
 
-# in the order of the checks
+# the order of the checks determines which error is reported
 _FIELDS: Final = dict(sorted(fields_dict(Winch).items(), key=lambda each: each[0] in _AXES))
 
 
 def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
-    """Checked values of one field."""
+    """Checked values of the field that `about` describes."""
     item = f"winches: {about.name}"
     array = checked(value, item, **about.metadata)
     match about.name:
         case "swivel_axis":
-            return _vertical(array)
+            return _axes_of(array)
         case "guides":
             return _points(array)
         case "layers":
@@ -271,7 +282,7 @@ def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
 
 
 def _points(points: Array) -> Array:
-    """The guides, (k, 3) for all cables or (m, k, 3) for each."""
+    """Checked guides, (k, 3) for all cables or (m, k, 3) for m cables."""
     if points.ndim not in (2, 3) or points.shape[-1] != 3 or 0 in points.shape:
         allowed = "shape (k, 3) or (m, k, 3), k >= 1"
         step = "Give the points in order, starting at the drum, or None."
@@ -280,12 +291,12 @@ def _points(points: Array) -> Array:
     if same.any():
         *cable, before = map(int, np.argwhere(same)[0])
         item = f"winches: guides[{', '.join(map(str, (*cable, before + 1)))}]"
-        raise InvalidValueError(item, "at the guide before it", "points apart", "Omit one of the two guides.")
+        raise InvalidValueError(item, "at the previous guide", "different points", "Omit one of the two guides.")
     return points
 
 
 def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
-    """The common shape of all fields, () or (m,)."""
+    """Common shape of all fields, () or (m,), from the shape of each field."""
     longest = max(shapes, key=lambda name: shapes[name])
     for name, shape in shapes.items():
         if len(shape) > 1 or 0 in shape:
@@ -297,24 +308,21 @@ def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     return shapes[longest]
 
 
-def _vertical(axis: Array) -> Array:
-    """Unit vectors of the swivel axes; refuses an axis that is not vertical."""
-    length = np.linalg.norm(axis, axis=-1)
-    item, step = "winches: swivel_axis", "Give [0, 0, 1] or [0, 0, -1]."
-    if not length.all():
-        raise InvalidValueError(item, "the zero vector", "up or down", step)
+def _axes_of(axis: Array) -> Array:
+    """Checked unit vectors of swivel axes; an axis within UPRIGHT of the vertical becomes exactly vertical."""
+    if not (length := np.linalg.norm(axis, axis=-1)).all():
+        item = "winches: swivel_axis" + (f"[{int(np.argmin(length))}]" if axis.ndim > 1 else "")
+        step = "Give the direction in which the cable enters the pulley, such as [0, 0, 1]."
+        raise InvalidValueError(item, "the zero vector", "a direction", step)
     axis = unit(axis)
-    if ((slant := np.hypot(axis[..., 0], axis[..., 1])) > UPRIGHT).any():
-        shown = ", ".join(f"{x:.3g}" for x in axis.reshape(-1, 3)[np.argmax(slant)])
-        step = f"Only pulleys with a vertical swivel axis are modeled. {step}"
-        raise InvalidValueError(item, f"({shown})", "up or down", step)
     upright = np.zeros(axis.shape)
     upright[..., 2] = np.sign(axis[..., 2])
-    return locked(upright)
+    slanted = np.hypot(axis[..., 0], axis[..., 1]) > UPRIGHT
+    return locked(np.where(slanted[..., None], axis, upright))
 
 
 def _check_pairs(winch: Winch) -> None:
-    """Refuse values that contradict each other, and a bearing that takes the whole tension."""
+    """Refuse fields that contradict each other, and a bearing that would take the whole tension."""
     dead_cable, dead_rise, friction = map(np.atleast_1d, (winch.dead_cable, winch.dead_rise, winch.rolling_friction))
     steep, allowed = np.abs(dead_rise) > dead_cable, "within +-{limit:g} m, its dead_cable"
     step = "A straight cable rises by at most its length; correct one of the two values."

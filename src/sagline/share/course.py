@@ -24,7 +24,7 @@ from sagline.statics.tables import chord_geometry
 if TYPE_CHECKING:
     from sagline.viewer.session import PlayedLog
 
-MOST_RATE: Final = 100.0  # samples per second of a screen; a run with at least twice as many loses samples
+MOST_RATE: Final = 100.0  # samples per second of a screen; a run with at least twice this rate is thinned
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +44,70 @@ class SharedMotion:
     verdicts: tuple[tuple[bool | None, str], ...]  # True for a good sample, None if unknown; verdict in words
     notes: tuple[str, ...] = ()
 
+    @classmethod
+    def of_plan(cls, plan: Plan) -> SharedMotion:
+        """Samples of a plan of N poses. Without times, the interval between poses is one second."""
+        count = len(plan.state.pose)
+        time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
+        verdicts: list[tuple[bool | None, str]] = [(True, "Feasible")]
+        which = np.zeros(count, dtype=np.intp)
+        for gap in plan.gaps:
+            which[gap.first : gap.last + 1] = len(verdicts)
+            verdicts.append((False, _why(gap)))
+        notes = ["The poses have no times; the page shows one per second."] * (plan.path is None)
+        if not isinstance(plan.state.cables.model, Catenary):
+            name = type(plan.state.cables.model).__name__.lower()
+            notes.append(f"Planned with the {name} model; cables are drawn as catenaries with these tensions.")
+        return cls(
+            plan.state.one_robot, "run", time - time[0], plan.state.pose.position, plan.state.pose.quaternion,
+            plan.chord_tension, "along the chord", plan.chord_tension, plan.unstrained_length, which, tuple(verdicts),
+            tuple(notes),
+        )  # fmt: skip
+
+    @classmethod
+    def of_simulation(cls, simulation: Simulation) -> SharedMotion:
+        """Samples of a simulation. Each cable with mass is drawn as a catenary at rest of the same length."""
+        robot, time = simulation.robot, simulation.time
+        broken = np.zeros_like(simulation.tensions, dtype=bool)
+        verdicts: list[tuple[bool | None, str]] = [(None, "Simulated")]
+        which = np.zeros(len(time), dtype=np.intp)
+        for event in simulation.events:
+            which[time >= event.time] = len(verdicts)
+            verdicts.append((None, f"{event.text.capitalize()} at {event.time - time[0]:.3f} s"))
+            if event.kind == "break" and event.cable is not None:
+                broken[time >= event.time, event.cable] = True
+        tension = np.where(broken, np.nan, simulation.tensions)
+        drawn = np.where(broken, np.nan, chord_tension(robot, simulation.pose, simulation.length))
+        with_mass = simulation.nodes is not None
+        notes = ("Cables with mass are drawn as catenaries of the same lengths at rest.",) * with_mass
+        pose = simulation.pose
+        return cls(
+            robot, "simulation", time - time[0], pose.position, pose.quaternion, tension, "at the frame end", drawn,
+            simulation.length, which, tuple(verdicts), notes,
+        )  # fmt: skip
+
+    @classmethod
+    def of_session(cls, session: PlayedLog) -> SharedMotion:
+        """Samples of a log of the controller. Poses are planned poses, or estimated poses of cycles without a plan."""
+        from sagline.viewer.session import WRONG
+
+        planned = np.isfinite(session.planned).all(axis=1, keepdims=True)
+        row = np.maximum(session.shown, 0)
+        position = np.where(planned, session.planned, session.position[row])
+        quaternion = np.where(planned, session.planned_quaternion, session.quaternion[row])
+        codes, which = np.unique(session.state, return_inverse=True)
+        states = [State(int(code)) for code in codes]
+        verdicts = tuple((False if state in WRONG else None, f"Controller: {state.name}") for state in states)
+        unknown = ~np.isfinite(position).all(axis=1)
+        if unknown.any():  # no earlier pose is known
+            somewhere = session.pose_at(int(np.argmax(unknown)))
+            position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
+        drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)
+        return cls(
+            session.robot, "log", session.time, position, quaternion, session.tension, "measured", drawn,
+            session.length, which.astype(np.intp), verdicts,
+        )  # fmt: skip
+
     def pose_at(self, index: int) -> Pose | None:
         """Pose of the platform at a sample; None if it is not known."""
         if not np.isfinite(self.position[index]).all():
@@ -51,7 +115,7 @@ class SharedMotion:
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
 
     def thinned(self) -> SharedMotion:
-        """Keep every n-th sample and the last one, if the rate exceeds that of screens; note how many are omitted."""
+        """Every n-th sample and the last sample, if the rate exceeds that of screens. A note has the number n."""
         count, duration = len(self.time), float(self.time[-1])
         every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
         if every <= 1:
@@ -63,26 +127,6 @@ class SharedMotion:
         return SharedMotion(
             self.robot, self.kind, quantity=self.quantity, verdicts=self.verdicts, notes=(*self.notes, note), **kept
         )
-
-
-def of_plan(plan: Plan) -> SharedMotion:
-    """Samples of a plan of N poses. Poses without times get intervals of one second."""
-    count = len(plan.state.pose)
-    time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
-    verdicts: list[tuple[bool | None, str]] = [(True, "Feasible")]
-    which = np.zeros(count, dtype=np.intp)
-    for gap in plan.gaps:
-        which[gap.first : gap.last + 1] = len(verdicts)
-        verdicts.append((False, _why(gap)))
-    notes = ["The poses have no times; the page shows one per second."] * (plan.path is None)
-    if not isinstance(plan.state.cables.model, Catenary):
-        name = type(plan.state.cables.model).__name__.lower()
-        notes.append(f"Planned with the {name} model; cables are drawn as catenaries with these tensions.")
-    return SharedMotion(
-        plan.state.one_robot, "run", time - time[0], plan.state.pose.position, plan.state.pose.quaternion,
-        plan.chord_tension, "along the chord", plan.chord_tension, plan.unstrained_length, which, tuple(verdicts),
-        tuple(notes),
-    )  # fmt: skip
 
 
 def _why(gap: Gap) -> str:
@@ -98,30 +142,8 @@ def _why(gap: Gap) -> str:
     return f"Not feasible: {short}{cables}"
 
 
-def of_simulation(simulation: Simulation) -> SharedMotion:
-    """Samples of a simulation. Cables with mass are drawn as catenaries at rest with the same lengths."""
-    robot, time = simulation.robot, simulation.time
-    broken = np.zeros_like(simulation.tensions, dtype=bool)
-    verdicts: list[tuple[bool | None, str]] = [(None, "Simulated")]
-    which = np.zeros(len(time), dtype=np.intp)
-    for event in simulation.events:
-        of = "" if event.cable is None else f" of cable {event.cable}"
-        which[time >= event.time] = len(verdicts)
-        verdicts.append((None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
-        if event.kind == "break" and event.cable is not None:
-            broken[time >= event.time, event.cable] = True
-    tension = np.where(broken, np.nan, simulation.tensions)
-    drawn = np.where(broken, np.nan, chord_tension(robot, simulation.pose, simulation.length))
-    notes = ("Cables with mass are drawn as catenaries of the same lengths at rest.",) * (simulation.nodes is not None)
-    pose = simulation.pose
-    return SharedMotion(
-        robot, "simulation", time - time[0], pose.position, pose.quaternion, tension, "at the frame end", drawn,
-        simulation.length, which, tuple(verdicts), notes,
-    )  # fmt: skip
-
-
 def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
-    """Chord tensions (N, m) of catenaries at rest; `length`: lengths off the drum. NaN for NaN or too short lengths.
+    """Chord tensions (N, m) of catenaries at rest. `length`: lengths off the drum; NaN and too short lengths give NaN.
 
     Cables leave their pulleys along the chord.
     """
@@ -133,25 +155,3 @@ def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
     span, rise = (np.where(known, chord * part, 1.0) for part in (cosine, sine))
     cables = Catenary().from_length(robot.cables, span, rise, np.where(known, free, 2.0), robot.gravity)
     return np.where(known, cables.chord_tension, np.nan)
-
-
-def of_session(session: PlayedLog) -> SharedMotion:
-    """Samples of a log of the controller, at planned poses. Without a plan, the samples are at estimated poses."""
-    from sagline.viewer.session import WRONG
-
-    planned = np.isfinite(session.planned).all(axis=1, keepdims=True)
-    row = np.maximum(session.shown, 0)
-    position = np.where(planned, session.planned, session.position[row])
-    quaternion = np.where(planned, session.planned_quaternion, session.quaternion[row])
-    codes, which = np.unique(session.state, return_inverse=True)
-    states = [State(int(code)) for code in codes]
-    verdicts = tuple((False if state in WRONG else None, f"Controller: {state.name}") for state in states)
-    unknown = ~np.isfinite(position).all(axis=1)
-    if unknown.any():  # no earlier pose is known
-        somewhere = session.pose_at(int(np.argmax(unknown)))
-        position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
-    drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)
-    return SharedMotion(
-        session.robot, "log", session.time, position, quaternion, session.tension, "measured", drawn, session.length,
-        which.astype(np.intp), verdicts,
-    )  # fmt: skip

@@ -38,14 +38,14 @@ _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2,
 
 
 def drawing_data(robot: Robot) -> dict[str, Any]:
-    """Calls for page/robot.js: the kernel that draws the cables of a run, with the data of the robot."""
+    """Data for page/robot.js: the call of the kernel that draws the cables of a run, and the data of `robot`."""
     pose, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros(robot.cable_count)
     arguments = _draw_arguments(robot, robot_terms(robot), pose[0], tension)
     return _described(robot, {"draw": ("cable_courses", arguments)}, pose, arguments)
 
 
 def model_data(robot: Robot) -> dict[str, Any]:
-    """Calls for page/robot.js: kernels of kinematics and of the drawing, with the data of the robot."""
+    """Data for page/robot.js: calls of the kernels of kinematics and drawing, and the data of `robot`."""
     behind, m, n = has_routing(robot) or None, robot.cable_count, robot.degrees_of_freedom
     model, method = Catenary(), DEFAULT.alone
     terms, options, memory = robot_terms(robot), kernel_options(robot, model, method), memory_for(m)
@@ -91,7 +91,7 @@ def model_data(robot: Robot) -> dict[str, Any]:
 def _described(
     robot: Robot, calls: dict[str, Call], pose: Array, draw: tuple[Any, ...], arrays: dict[str, AnyArray] | None = None
 ) -> dict[str, Any]:
-    """Calls and arrays with the kernel of the drawing, the anchors [m] and the pulley radii [m]."""
+    """Described `calls` and `arrays`, anchors [m] and pulley radii [m]. `draw`: arguments of the drawing kernel."""
     drawn = {"pose": pose, "drawn": draw[3], "points": draw[-1]}
     return {
         "kernels": described_calls(calls, drawn | (arrays or {})),
@@ -116,7 +116,7 @@ def solids_data(robot: Robot) -> dict[str, Any]:
 
 
 def colors(robot: Robot) -> dict[str, Any]:
-    """Color scale of the tensions, with numbers."""
+    """Color scale of the tensions: colors, ticks and unit."""
     scale, unit = TensionScale.of(robot), ForceUnit.up_to(float(_highest(robot)))
     shares = np.linspace(0.0, 1.0, 24)
     steps = scale.low * (scale.high / scale.low) ** shares
@@ -152,7 +152,7 @@ def _triangles(solid: shapes.Solid, size: float) -> tuple[dict[str, object], str
 
 
 def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
-    """Points (m, points_per_cable, 3) of exact cables at chord tensions (m,); straight lines for NaN."""
+    """Points (m, points_per_cable, 3) of exact cables at chord tensions `tension` (m,). NaN gives a straight line."""
     arguments = _draw_arguments(robot, robot_terms(robot), pose_rows(pose)[0], tension)
     cable_courses(*arguments)
     points: Array = arguments[-1]
@@ -160,14 +160,14 @@ def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
 
 
 def _draw_arguments(robot: Robot, terms: tuple[Array, Array, Array], pose: Array, tension: Array) -> tuple[Any, ...]:
-    """Arguments of `cable_courses`, with the points as the last argument; `pose` is a pose row."""
+    """Arguments of `cable_courses`. The last argument is the array of points. `pose` is a pose row."""
     m, points = robot.cable_count, shapes.points_per_cable(robot)
     work = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m)), np.empty((m, points, 3))
     return terms[2][0], terms[1][0], pose, tension, points - shapes.POINTS, *work
 
 
 def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
-    """SVG drawing of frame, platform and cables, for given chord tensions."""
+    """SVG drawing of frame, platform and cables at `pose`. `tension`: chord tensions (m,) [N]."""
     courses = courses_at(robot, pose, tension)
     low, high = bounds(robot)
     frame = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError
+from sagline.files.packed import smallest_differences
 
 Call = tuple[str, tuple[Any, ...]]  # name of the C entry without prefix, and arguments as in Python
 AnyArray = NDArray[Any]
@@ -23,7 +24,7 @@ _ALIGNED: Final = 16  # bytes
 
 
 def check_module() -> None:
-    """Create the FileError for a missing WebAssembly module, with the command that makes the module."""
+    """Raise FileError if the WebAssembly module is missing. The message has the command that makes the module."""
     if not MODULE.is_file():
         step = "Run python -m tools.build in the source checkout, or install a wheel of sagline."
         raise FileError(str(MODULE), "is missing, but shared pages need it", step)
@@ -36,7 +37,7 @@ def module_text() -> str:
 
 
 def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) -> dict[str, Any]:
-    """Describe calls: addresses of all arrays, contents of write-protected arrays, and arguments in C.
+    """Description of calls: addresses of all arrays, contents of write-protected arrays, and arguments in C.
 
     `calls`: calls by the name of the function in the page. `names`: arrays or contiguous views that the page uses.
     Arrays that are not write-protected contain zeros at the start.
@@ -92,7 +93,7 @@ def _owner(array: AnyArray) -> AnyArray:
 
 Codes = NDArray[np.int64]
 
-_ORDERS: Final = (0, 1, 2, 3)  # possible orders of differences; the order that gives the smallest data is used
+MOST_ORDER: Final = 3  # largest order of differences that page/states.js restores
 _LEVEL: Final = 9
 
 
@@ -122,7 +123,7 @@ def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object],
 
 
 def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
-    """Round values to whole numbers of steps. The code of a missing value is also returned (None if not needed)."""
+    """Values rounded to whole numbers of steps, and the code of a missing value, or None if no value is missing."""
     known = np.isfinite(values)
     if channel.scale == "relative":
         known &= values > 0.0
@@ -136,18 +137,12 @@ def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
     return np.where(known, codes, nothing), nothing
 
 
-def _least(column: Codes) -> tuple[int, int, Codes]:
-    """Order with the smallest differences, their size [bytes], and the differences with the signs in the lowest bit."""
-    found = []
-    for order in _ORDERS:
-        rest = column
-        for _ in range(order):
-            rest = np.diff(rest, prepend=0)
-        found.append(np.where(rest < 0, -2 * rest - 1, 2 * rest))
-    order = int(np.argmin([np.log1p(code).sum() for code in found]))
-    return order, max(1, (int(found[order].max()).bit_length() + 7) // 8), found[order]
+def _least(column: Codes) -> tuple[int, int, NDArray[np.uint64]]:
+    """Order whose differences are smallest, their size [bytes], and the differences with their signs as lowest bits."""
+    order, small = smallest_differences(column, MOST_ORDER)
+    return order, max(1, (int(small.max()).bit_length() + 7) // 8), small
 
 
-def _planes(codes: Codes, count: int) -> bytes:
+def _planes(codes: NDArray[np.uint64], count: int) -> bytes:
     """Lowest bytes of all codes, then their second bytes, and so on."""
     return b"".join((codes >> (8 * plane) & 255).astype(np.uint8).tobytes() for plane in range(count))

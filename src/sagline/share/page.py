@@ -27,7 +27,7 @@ SCRIPTS: Final = (  # in the order of their dependencies
     "renderer.js", "camera.js", "scene.js", "panel.js",
     "pointers.js", "player.js", "share.js",
 )  # fmt: skip
-MADE: Final = '<meta name="generator" content="sagline'  # mark by which pages of sagline are recognized
+MADE: Final = '<meta name="generator" content="sagline'  # mark of the pages of sagline
 POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # resolutions [m, -, m, relative, s]
 WOUND: Final = 0.002  # largest change of a length with the slider, as a share of the robot's size
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -51,7 +51,6 @@ def robot_page(robot: Robot) -> str:
         controls=_sliders(robot),
         over=RING + HOME,
         quantity="along the chord",
-        robot=robot,
         still=robot_drawing(robot, at, plan.chord_tension),
         table=_table(robot, plan.chord_tension, plan.unstrained_length),
         notes=("Tensions of least norm within the limits, elastic catenaries, platform at rest.", *_guides(robot)),
@@ -91,7 +90,6 @@ def course_page(course: SharedMotion, title: str) -> str:
         controls=_clock(),
         over=HOME,
         quantity=kept.quantity,
-        robot=robot,
         still=robot_drawing(robot, home_pose(robot) if first is None else first, kept.chord_tension[0]),
         table=_table(robot, kept.tension[0], kept.length[0]),
         notes=(*kept.notes, _precision()),
@@ -100,7 +98,7 @@ def course_page(course: SharedMotion, title: str) -> str:
     )
 
 
-def _filled(robot: Robot, facts: dict[str, Any], notes: Sequence[str], **parts: str) -> str:
+def _filled(facts: dict[str, Any], notes: Sequence[str], **parts: str) -> str:
     own = files("sagline.share").joinpath("page")
     scale = facts["colors"]
     low, high = (f"{scale[end] / scale['newtons']:,.4g}" for end in ("low", "high"))
@@ -146,13 +144,13 @@ def _sliders(robot: Robot) -> str:
 
 
 def _guides(robot: Robot) -> tuple[str, ...]:
-    """Note about guides, because the kernels compute no catenaries between guides."""
+    """Note for a robot with guides, because the page draws no catenaries between guides."""
     given = robot.winches is not None and robot.winches.guides is not None
     return ("Cables between guides count as straight.",) * given
 
 
 def _winch(robot: Robot) -> str:
-    """HTML for the choice of a cable, and a slider for the change of its length [mm]."""
+    """HTML of the choice of a cable, and of a slider for the change of its length [mm]."""
     names = "".join(f'<option value="{i}">{i}</option>' for i in range(robot.cable_count))
     most = 1e3 * round_below(WOUND * size_of(robot))
     return (

@@ -1,4 +1,4 @@
-"""Statics of the platform: structure matrix, required wrench, and inertial wrench of a motion."""
+"""Statics of the platform: structure matrix, inertial wrench, stiffness, and the article's force balance."""
 
 from sagline.core.surface import group
 

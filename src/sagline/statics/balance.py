@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
+from sagline.kernels import structure_matrices
 from sagline.kernels.cable import geometry as rows
-from sagline.kernels.statics import structure_matrices
 from sagline.robot.batch import Robots, first_of, one_a_pose, robot_fields
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.robot import Robot
@@ -20,7 +20,7 @@ from sagline.statics.tables import chord_geometry, refuse_missing_chords
 
 
 def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
-    """Inertial (d'Alembert) wrench of a motion of the platform.
+    """Inertial (d'Alembert) wrench that a motion causes on the platform.
 
     Args:
         robot: Robot with mass, center of mass and inertia; or a sequence of N robots, one per pose.
@@ -32,8 +32,8 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
         Force -M p_c'' [N] and moment -(Gamma w' + w x Gamma w) [N m] about the center of mass, shape (N, 6).
 
     Raises:
-        InvalidValueError: If `robot` is a sequence whose length is not N, or whose robots do not fit together. If the
-            numbers of poses, twists and twist rates differ.
+        InvalidValueError: If `robot` is a sequence with another length than N, or with robots that cannot be in one
+            batch; if the numbers of poses, twists and twist rates differ.
 
     Examples:
         >>> import sagline as sl
@@ -66,7 +66,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
 
 
 def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
-    """Checked wrench of a caller, (6,) or (N, 6) [N, N m]; None becomes zeros."""
+    """Checked external wrench, (6,) or (N, 6) [N, N m]; None becomes zeros."""
     if wrench is None:
         return locked(np.zeros(6))
     array = checked(wrench, "wrench", "N or N m", shape=(6,))
@@ -77,11 +77,11 @@ def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
 
 
 class ArticleBalance(NamedTuple):
-    """System H t_x + b = [F; tau] of the article: force and moment about the center of mass, without gravity.
+    """Linear system H t_x + b = [F; tau] of the article, with force F and moment tau about the center of mass.
 
     Attributes:
-        h: The matrix H of (50), shape (..., 6, m).
-        b: The vector b of (51), including the platform's weight once, shape (..., 6).
+        h: Matrix H of equation (50), shape (..., 6, m).
+        b: Vector b of equation (51), in which the platform's weight is included once, shape (..., 6).
     """
 
     h: Array
@@ -89,24 +89,25 @@ class ArticleBalance(NamedTuple):
 
 
 def _geometry(robot: Robots, pose: Pose) -> Array:
-    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m). Refuses a pose at which a cable has no chord."""
+    """Chord geometry of every pose, shape (N, GEOMETRY_ROWS, m); raises an error if a cable has no chord."""
     geometry = chord_geometry(robot, pose)
     refuse_missing_chords(robot, pose, geometry)
     return geometry
 
 
 def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
-    """Structure matrix J. Its columns are wrenches of unit chord tensions about the center of mass, in world axes.
+    """Structure matrix J. A column is the wrench of a unit chord tension about the center of mass, in world axes.
 
     Args:
-        robot: The robot; or a sequence of N robots that fit together (see `inverse`), one per pose.
+        robot: The robot; or a sequence of N robots, one per pose, as in `inverse`.
         pose: One pose or a batch of N.
 
     Returns:
-        Matrix with the columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
+        Matrix of shape (n, m) or (N, n, m). Column i has the components of (u_i; r_i x u_i) along the free motions.
 
     Raises:
-        InvalidValueError: If robot is a sequence whose length is not N, or whose robots do not fit together.
+        InvalidValueError: If `robot` is a sequence with another length than N, or with robots that cannot be in one
+            batch.
         CableGeometryError: If both ends of a cable coincide, or its platform end is inside its pulley. The message
             names pose and cable.
 
@@ -131,21 +132,22 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
 
 
 def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> ArticleBalance:
-    """Matrix H and vector b of the article, for the horizontal tensions t_x; for comparison with `structure_matrix`.
+    """Matrix H and vector b of the article's force balance, in which the unknowns are horizontal tensions t_x.
 
-    The levers in the equations of the article are b_i = B_i - P from the center of mass. The sign of b_pi is corrected
+    The levers of the article are b_i = B_i - P, measured from the center of mass. The sign of b_pi is corrected
     (erratum 1), and gravity is counted once (erratum 2). H and b are infinite directly under an anchor (erratum 8).
+    Compare with `structure_matrix`.
 
     Args:
         robot: The robot.
         pose: One pose or a batch of N.
-        k_h: The intercept constant of (28).
+        k_h: Intercept constant of equation (28) [m/s^2].
 
     Returns:
-        H of shape (6, m) or (N, 6, m), b of shape (6,) or (N, 6).
+        ArticleBalance with H of shape (6, m) or (N, 6, m), and b of shape (6,) or (N, 6).
 
     Raises:
-        InvalidValueError: If robot or pose has the wrong type, or k_h is not a number.
+        InvalidValueError: If `robot` or `pose` has a wrong type, or `k_h` is not a number.
         CableGeometryError: If both ends of a cable coincide, or its platform end is inside its pulley. The message
             names pose and cable.
 
@@ -166,7 +168,7 @@ def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> Article
     cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
     bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
     pull = k_h * robot.cables.linear_density * geometry[rows.CHORD]
-    with np.errstate(divide="ignore", invalid="ignore"):  # a zero lever times an infinite slope gives NaN
+    with np.errstate(divide="ignore", invalid="ignore"):  # 0 lever * infinite slope = NaN
         slope = geometry[rows.RISE] / geometry[rows.SPAN]
         h = -np.stack(
             (cosine, sine, slope, by * slope - bz * sine, bz * cosine - bx * slope, bx * sine - by * cosine), axis=-2

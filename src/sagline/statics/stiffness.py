@@ -16,43 +16,42 @@ from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
 
-_SINGULAR = 1e-14  # smallest determinant of a matrix with diagonal elements of 1 that counts as regular
-# relative to the largest squared frequency; a squared frequency of smaller magnitude counts as zero
+_SINGULAR = 1e-14  # smallest determinant of a regular matrix that is scaled to diagonal elements of 1
+# A squared frequency counts as zero if it is smaller than this share of the largest.
 NEUTRAL, UNSTABLE = 1e-13, 1e-10
-_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state that the calculation needs [bytes]
+_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # [bytes], memory per cable and pose
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Stiffness(Result):
     """Result of `stiffness`, single or with a leading axis N.
 
-    A motion is (displacement of the center of mass [m], rotation vector [rad]). A wrench is (force [N], moment [N m])
-    about the center of mass. Both are in world axes. Sensitivities are zero for motions outside the robot's motion
-    pattern, and NaN if the stiffness is singular.
+    A motion is (displacement of the center of mass [m], rotation vector [rad]) in world axes. A wrench is (force [N],
+    moment [N m]) about the center of mass in world axes. Sensitivities of motions that the motion pattern does not
+    allow are zero. All sensitivities are NaN if the stiffness is singular.
 
     Attributes:
-        state: Equilibrium to which the stiffness belongs.
+        state: Equilibrium at which the stiffness is computed.
         matrix: -d(wrench of the cables)/d(motion) at fixed lengths, shape (..., 6, 6): the sum of elastic, sag and
-            geometric stiffness. Its skew part is half the given moment, because this moment does not rotate with the
-            platform.
+            geometric stiffness. The skew part is half of the external moment, which does not rotate with the platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
         stiffness_sensitivity: d(motion)/d(axial stiffness) of each cable, shape (..., 6, m) [m/N, rad/N].
         pulley_radius_sensitivity: d(motion)/d(pulley radius) of each cable at constant length off the drum, shape (...,
             6, m) [m/m, rad/m].
-        dead_cable_sensitivity: d(motion)/d(dead length) at constant length off the drum, shape (..., 6, m) [m/m,
-            rad/m].
-        cable_stiffness: dT/dB of each cable, with the force T on its platform end and the position B of this end, world
-            axes, shape (..., m, 3, 3) [N/m].
+        dead_cable_sensitivity: d(motion)/d(dead length) of each cable at constant length off the drum, shape (..., 6,
+            m) [m/m, rad/m].
+        cable_stiffness: dT/dB of each cable; T is the force on the platform end, B the position of the platform end,
+            world axes, shape (..., m, 3, 3) [N/m].
         frame_anchor_sensitivity: d(motion)/d(frame anchor, world axes) at fixed lengths, shape (..., 6, m, 3)
             [m/m, rad/m].
         platform_anchor_sensitivity: d(motion)/d(platform anchor, platform frame) at fixed lengths, shape (..., 6, m, 3)
             [m/m, rad/m].
         tension_sensitivity: d(tension at the frame end of cable i)/dL_j with the platform in equilibrium, shape (...,
             m, m) [N/m].
-        null_lengths: Orthonormal columns of length changes that do not move the platform (to first order), shape (...,
-            m, m - n) with the number n of free motions; without columns if m <= n.
+        null_lengths: Orthonormal columns of length changes that do not move the platform to first order, shape (..., m,
+            m - n), where n is the number of free motions; no columns if m <= n.
     """
 
     state: Equilibrium
@@ -75,9 +74,8 @@ class Modes(Result, Tabular):
     """Result of `modes`, single or with a leading axis N; n is the number of free motions.
 
     Attributes:
-        state: Equilibrium to which the modes belong.
-        frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for motions without stiffness, NaN for
-            unstable motions.
+        state: Equilibrium about which the platform vibrates.
+        frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 without stiffness, NaN for unstable motions.
         shape: Mode shapes, scaled to a modal mass of 1, as columns (displacement of the center of mass, rotation
             vector) in world axes, shape (..., 6, n) [m/sqrt(kg), rad/(sqrt(kg) m)].
     """
@@ -90,10 +88,10 @@ class Modes(Result, Tabular):
 
     @property
     def above_strings(self) -> Flags:
-        """True for modes above the lowest frequency of a cable with fixed ends.
+        """True (..., n) for each mode with a frequency above the lowest frequency of any cable with fixed ends.
 
-        Above this frequency the cables vibrate, and these modes do not approximate the modes of the robot (see
-        `vibration`). The result has the shape (..., n), and is False for a motion without stiffness.
+        A mode above this frequency is not a good approximation, because cables also vibrate (see `vibration`). The
+        result is False for a motion without stiffness.
         """
         frequency = np.nan_to_num(self.frequency.reshape(-1, self.frequency.shape[-1]))
         below = strings_below(strings_of(self.state), frequency)
@@ -102,13 +100,13 @@ class Modes(Result, Tabular):
 
 @of_equilibrium
 def stiffness(state: Equilibrium) -> Stiffness:
-    """Stiffness of the platform at fixed unstrained lengths, and sensitivities of the pose, from analytic derivatives.
+    """Compute the stiffness of the platform at fixed unstrained lengths, and sensitivities of the pose.
 
     Args:
         state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
 
     Returns:
-        Stiffness; NaN if `state` has no lengths. Also NaN for straight cables, whose stiffness is undefined.
+        Stiffness; NaN at a pose without a solution, and for straight cables, whose stiffness is undefined.
 
     Raises:
         InvalidValueError: If `state` has another type.
@@ -152,13 +150,13 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
 
 def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """Frame anchor sensitivity (..., 6, m, 3). A motion da of the frame end acts like -da of the platform end."""
+    """Sensitivity to frame anchors (..., 6, m, 3). A motion da of the frame end acts as -da of the platform end."""
     columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
     return np.stack(columns, axis=-1)
 
 
 def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Array) -> Array:
-    """Platform anchor sensitivity (..., 6, m, 3). A change db moves the platform end, and its force, by Q db."""
+    """Sensitivity to platform anchors (..., 6, m, 3). A change db shifts the end of the cable and its force by Q db."""
     rotation = state.pose.matrix[..., None, :, :]
     columns = []
     for k in range(3):
@@ -170,14 +168,14 @@ def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Arr
 
 
 def _tension_by_length(state: Equilibrium, slopes: CableSlopes, by_length: Array) -> Array:
-    """d(tension at the frame end of cable i)/dL_j with the platform in equilibrium, shape (..., m, m)."""
+    """Derivatives (..., m, m) of the frame-end tension of cable i by L_j, with the platform in equilibrium."""
     by_motion, own = tension_slopes(state, slopes)
     found: Array = by_motion @ by_length + own[..., None] * np.eye(own.shape[-1])
     return found
 
 
 def _null_space(matrix: Array) -> Array:
-    """Orthonormal basis of the null space of matrices (..., n, m), shape (..., m, m - n); NaN for a matrix with NaN."""
+    """Orthonormal basis (..., m, m - n) of the null space of matrices (..., n, m); NaN for a matrix with NaN."""
     n, m = matrix.shape[-2:]
     lost = np.isnan(matrix).any(axis=(-1, -2), keepdims=True)
     rows: Array = np.linalg.svd(np.where(lost, 0.0, matrix), full_matrices=True)[2][..., min(n, m) :, :]
@@ -186,14 +184,14 @@ def _null_space(matrix: Array) -> Array:
 
 @of_equilibrium
 def modes(state: Equilibrium) -> Modes:
-    """Natural frequencies and mode shapes of the platform on its cables; cables are massless.
+    """Compute natural frequencies and mode shapes of the platform on massless cables.
 
     Args:
         state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
             The free motions must have mass; rotations require an inertia.
 
     Returns:
-        Modes; NaN if the state has no lengths.
+        Modes; NaN at a pose without a solution.
 
     Raises:
         InvalidValueError: If `state` has another type.
@@ -220,9 +218,9 @@ def modes(state: Equilibrium) -> Modes:
 
 
 def smallest_stiffness(state: Equilibrium) -> Array:
-    """Smallest stiffness of the platform against its free motions [N/m], shape (...,); NaN without lengths.
+    """Smallest stiffness of the platform against its free motions [N/m], shape (...,); NaN without a solution.
 
-    A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass.
+    The size of a rotation is its arc at the root mean square distance of the platform ends from the center of mass.
     """
     _check_state(state, _MODES_BYTES)
     slopes, freedom = cable_slopes(state), first_of(state.robot).freedom
@@ -237,10 +235,10 @@ def smallest_stiffness(state: Equilibrium) -> Array:
 
 
 def natural_frequency(squares: Array) -> Array:
-    """Frequencies [Hz] from squared angular frequencies, shape (..., n).
+    """Frequencies [Hz] from squared angular frequencies `squares`, shape (..., n).
 
-    A motion without stiffness, such as a rotation about a single rope, has 0 Hz. Its squared frequency is only a
-    rounding error. The frequency of an unstable motion is NaN.
+    A motion without stiffness, such as the rotation about a single rope, gets 0 Hz, because its squared frequency is
+    only a rounding error. An unstable motion gets NaN.
     """
     largest = np.abs(squares).max(axis=-1, keepdims=True, initial=0.0)
     known = np.where(squares > NEUTRAL * largest, squares, np.where(squares < -UNSTABLE * largest, np.nan, 0.0))
@@ -253,17 +251,36 @@ def _check_state(state: Equilibrium, cable_bytes: float) -> None:
 
 
 def compliance_of(freedom: Array, matrix: Array) -> Array:
-    """Inverse of the stiffness `matrix` for the motions `freedom` (n, 6), zero for other motions; NaN if singular."""
+    """Compliance: inverse of the stiffness for the free motions, zero for all other motions; NaN if singular."""
     return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
 
 
+def least_stiffness(freedom: Array, matrix: Array) -> Array:
+    """Stiffness against a force on the center of mass, in the softest direction [N/m], (N,); 0 if unstable.
+
+    Arguments: `freedom`, free motions (n, 6); `matrix`, stiffnesses of the platform in world axes (N, 6, 6), or NaN.
+    """
+    lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
+    own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T
+    own = 0.5 * (own + np.swapaxes(own, 1, 2))
+    size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
+    size[size == 0.0] = 1.0
+    balanced = own / (size[:, :, None] * size[:, None, :])  # makes forces and moments comparable
+    stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
+    compliance = compliance_of(freedom, matrix)[:, :3, :3]
+    known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))
+    given = np.where(known[:, None, None], compliance, np.eye(3))
+    largest = np.linalg.eigvalsh(0.5 * (given + np.swapaxes(given, 1, 2)))[:, -1]
+    return np.where(lost, np.nan, np.where(known, 1.0 / largest, 0.0))
+
+
 def _inverse(matrix: Array) -> Array:
-    """Inverse of each matrix; NaN for a matrix that is singular or contains NaN."""
+    """Inverse of every matrix; NaN for a matrix that is singular or contains NaN."""
     unit = np.eye(matrix.shape[-1])
     known = np.where(np.isnan(matrix).any(axis=(-1, -2), keepdims=True), 0.0, matrix)
     diagonal = np.abs(np.einsum("...ii->...i", known))
     scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    # rows and columns are scaled, so that N and N m have the same magnitude
+    # rows and columns are scaled so that forces and moments have similar magnitudes
     balanced = known / (scale[..., :, None] * scale[..., None, :])
     lost = np.abs(np.linalg.det(balanced))[..., None, None] < _SINGULAR
     inverse: Array = np.linalg.inv(np.where(lost, unit, known))
@@ -271,7 +288,7 @@ def _inverse(matrix: Array) -> Array:
 
 
 def mass_matrix(state: Equilibrium) -> Array:
-    """Mass and inertia of the platform about the center of mass, in world axes, (..., 6, 6) [kg, kg m^2]."""
+    """Mass matrix (..., 6, 6) of the platform about the center of mass, in world axes [kg, kg m^2]."""
     rotation = state.pose.matrix
     own, inertia = robot_fields(state.robot, "mass", "inertia")
     mass = np.zeros((*state.pose.shape, 6, 6))

@@ -1,4 +1,4 @@
-"""Cables as strings: data for their vibrations about an equilibrium."""
+"""Cables as vibrating strings: data for their vibrations about an equilibrium."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from sagline.robot.batch import cables_of, first_of, robot_fields
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import cable_table
 
-FOLD = 1e-6  # relative to the weight; a cable with a smaller tension is folded and has no linear vibration
-# phase of an element for counting modes [rad], < pi; the relative error of a frequency is then 1e-13
+FOLD = 1e-6  # a cable with a tension below this share of its weight is folded, and has no linear vibration
+# [rad], < pi: phase per element for the count of modes; frequencies then have a relative error of 1e-13
 COUNTING = 0.75 * np.pi
-# relative to EA; a cable with a smaller tension is slack, and its two stiffnesses differ too much for the computation
+# A cable with a tension below this share of EA is slack: its stiffnesses differ too much for the computation.
 SLACK = 1e-7
 _TINY = 1e-300
 
 
 class Strings(NamedTuple):
-    """Data of the cables as strings, for N equilibria."""
+    """Data of the cables as vibrating strings, for N equilibria."""
 
-    table: Array  # columns as in `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS)
-    axes: Array  # world axes of each cable: horizontal in its plane, normal to the plane, upward, shape (N, m, 3, 3)
-    taut: Flags  # True for cables with linear vibrations: neither folded nor slack, shape (N, m)
+    table: Array  # columns of `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS)
+    axes: Array  # axes of each cable: horizontal in its plane, normal to its plane, upward, shape (N, m, 3, 3)
+    taut: Flags  # True for cables that are neither folded nor slack, shape (N, m)
 
 
 def strings_of(state: Equilibrium) -> Strings:
-    """Data of the cables of an equilibrium as strings."""
+    """String data of the cables of an equilibrium."""
     cables = state.cables
     m = cables.shape[-1]
     material = cables_of(state.robot)
@@ -57,7 +57,7 @@ def strings_of(state: Equilibrium) -> Strings:
 
 
 def strings_below(strings: Strings, frequency: Array) -> Indices:
-    """Number of natural frequencies below `frequency` (N, F) [Hz], for cables with both ends fixed, (N, F, m)."""
+    """Number (N, F, m) of natural frequencies of a cable with fixed ends that are below `frequency` (N, F) [Hz]."""
     below = np.zeros((*frequency.shape, strings.taut.shape[1]), dtype=np.int64)
     waves, room = undamped(frequency), np.empty(collocation.ROOM)
     for row, taut in enumerate(strings.taut):
@@ -70,7 +70,7 @@ def strings_below(strings: Strings, frequency: Array) -> Indices:
 
 
 def undamped(frequency: Array) -> Array:
-    """Waves in undamped cables at frequencies (N, F) [Hz], for kernels, (N, F, WAVE_COLUMNS)."""
+    """Data (N, F, WAVE_COLUMNS) for kernels about waves in undamped cables at frequencies (N, F) [Hz]."""
     waves = np.zeros((*frequency.shape, collocation.WAVE_COLUMNS))
     waves[..., collocation.OMEGA] = omega = 2.0 * np.pi * frequency
     waves[..., collocation.SQUARE] = omega**2
@@ -79,7 +79,7 @@ def undamped(frequency: Array) -> Array:
 
 
 def _axes(state: Equilibrium) -> Array:
-    """Axes of each cable, one per row, shape (..., m, 3, 3); world axes for a vertical cable."""
+    """Axes of each cable as the rows of a matrix, shape (..., m, 3, 3); world axes for a vertical cable."""
     frame, platform = robot_fields(state.robot, "frame_anchors", "platform_anchors")
     turned = platform @ np.swapaxes(state.pose.matrix, -1, -2)
     level = (state.pose.position[..., None, :] + turned - frame)[..., :2]
@@ -95,7 +95,7 @@ def _axes(state: Equilibrium) -> Array:
 
 
 def taut_of(table: Array) -> Flags:
-    """True for cables with linear vibrations: neither folded nor slack, (N, m); `table`: (N, m, STRING_COLUMNS)."""
+    """True for each cable that is neither folded nor slack, (N, m); table: string data (N, m, STRING_COLUMNS)."""
     top = table[..., columns.VERTICAL]
     hanging = table[..., columns.WEIGHT] * table[..., columns.LENGTH]
     vertical = np.maximum(np.maximum(top - hanging, -top), 0.0)

@@ -1,44 +1,69 @@
-"""Robots and poses as arrays for kernels, and chord geometry of the cables."""
+"""Arrays of robots and poses for kernels, and chord geometry of the cables."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, locked
-from sagline.core.errors import CableGeometryError
+from sagline.core.errors import CableGeometryError, InvalidValueError
+from sagline.kernels import codes
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
-from sagline.kernels.statics import SHORTEST_CHORD
-from sagline.robot.batch import Robots, first_of, pulleys_of
+from sagline.kernels.tables import SHORTEST_CHORD
+from sagline.robot.batch import Robots, first_of, has_slanted_axes, pulleys_of, refuse_slanted
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 
-def cable_table(robot: Robots) -> Array:
-    """Anchors, material and limits of the cables, columns as in kernels.tables, (1 or N, m, CABLE_COLUMNS)."""
+def cable_table(robot: Robots, slanted: bool = False) -> Array:
+    """Table (1 or N, m, CABLE_COLUMNS) with anchors, material and limits; columns of `sagline.kernels.tables`."""
+    # slanted: True if the caller supports swivel axes that are not vertical; the table of a robot with such an axis has
+    # SWIVEL_COLUMNS columns. Robots with such axes are refused otherwise.
+    if slanted and has_slanted_axes(robot):
+        return locked(np.array([slanted_rows(one) for one in ((robot,) if isinstance(robot, Robot) else robot)]))
+    refuse_slanted(robot)
     robots = (robot,) if isinstance(robot, Robot) else robot
-    return locked(np.array([_cable_rows(one) for one in robots]))
+    return locked(np.array([_cable_rows(one, pulleys_of(one)) for one in robots]))
+
+
+def check_slanted(robot: Robots, model: CableModel) -> None:
+    """Refuse cable models other than the exact and the weightless one with swivel axes that are not vertical."""
+    if model.code not in (codes.CATENARY, codes.ELASTIC) and has_slanted_axes(robot):
+        step = "Use the default model; the others have vertical swivel axes only."
+        raise InvalidValueError("model", type(model).__name__, "Catenary or Elastic for such swivel axes", step)
+
+
+def slanted_rows(robot: Robot) -> Array:
+    """Rows of `cable_table` with swivel axes of any direction, (m, SWIVEL_COLUMNS)."""
+    winches, m = robot.winches, robot.cable_count
+    if winches is None:
+        radius, axes, entry = np.zeros(m), np.tile((0.0, 0.0, 1.0), (m, 1)), np.ones(m)
+    else:
+        radius, axes = winches.pulley_radius, winches.swivel_axis
+        entry = np.where(winches.slanted, np.nan, np.where(axes[:, 2] < 0.0, -1.0, 1.0))
+    return np.hstack((_cable_rows(robot, (radius, entry)), axes))
 
 
 def body_table(robot: Robots) -> Array:
-    """Mass, gravity and center of mass of the platform, columns as in kernels.tables, (1 or N, BODY_COLUMNS)."""
+    """Table (1 or N, BODY_COLUMNS) with mass, gravity and center of mass; columns of `sagline.kernels.tables`."""
     robots = (robot,) if isinstance(robot, Robot) else robot
     return locked(np.array([[one.mass, one.gravity, *one.center_of_mass] for one in robots]))
 
 
 def pose_rows(pose: Pose) -> Array:
-    """Positions and quaternions of a pose or a batch, (N, POSE_COLUMNS)."""
+    """Rows (N, POSE_COLUMNS) with positions and quaternions of a batch; one row for a single pose."""
     rows = np.concatenate((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)), axis=1)
     return locked(rows)
 
 
-def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
-    """Arrays for kernels, of one or several robots: free motions (n, 6), body_table and cable_table."""
-    return first_of(robot).freedom, body_table(robot), cable_table(robot)
+def robot_terms(robot: Robots, slanted: bool = False) -> tuple[Array, Array, Array]:
+    """Arrays of one or several robots for kernels: matrix of free motions (n, 6), `body_table` and `cable_table`."""
+    return first_of(robot).freedom, body_table(robot), cable_table(robot, slanted)
 
 
-def _cable_rows(robot: Robot) -> Array:
-    """Rows of `cable_table` for one robot, (m, CABLE_COLUMNS)."""
+def _cable_rows(robot: Robot, pulleys: tuple[Array, Array]) -> Array:
+    """Rows of `cable_table` for one robot, (m, CABLE_COLUMNS). `pulleys`: radius and entry, (m,) each."""
     none = np.zeros(robot.cable_count)
     run = (none, none) if robot.winches is None else (robot.winches.dead_cable, robot.winches.dead_rise)
     columns = (
@@ -48,14 +73,14 @@ def _cable_rows(robot: Robot) -> Array:
         robot.cables.axial_stiffness[:, None],
         robot.tension_min[:, None],
         robot.tension_max[:, None],
-        np.stack((*pulleys_of(robot), *run), axis=1),  # pulley radius, entry, dead length and dead rise
+        np.stack((*pulleys, *run), axis=1),  # radius, entry, dead length, dead rise
     )
     return np.hstack(columns)
 
 
-def chord_geometry(robot: Robots, pose: Pose) -> Array:
-    """Geometry of every cable at every pose, rows as in `sagline.kernels.cable.geometry`, (N, GEOMETRY_ROWS, m)."""
-    cables, poses = cable_table(robot), pose_rows(pose)
+def chord_geometry(robot: Robots, pose: Pose, slanted: bool = False) -> Array:
+    """Geometry (N, GEOMETRY_ROWS, m) of all cables at all poses; rows of `sagline.kernels.cable.geometry`."""
+    cables, poses = cable_table(robot, slanted), pose_rows(pose)
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
     with np.errstate(all="ignore"):
         cable_geometries(cables, body_table(robot), poses, np.empty((3, 3)), out)
@@ -63,7 +88,7 @@ def chord_geometry(robot: Robots, pose: Pose) -> Array:
 
 
 def touching_angle(robot: Robot, pose: Pose) -> Array:
-    """Wrap angle psi of straight cables, from the tangents between platform ends and pulleys, (m,) [rad]."""
+    """Wrap angles psi (m,) [rad] of straight cables, which are tangents between platform ends and pulleys."""
     radius, entry = pulleys_of(robot)
     geometry = chord_geometry(robot, pose)[0]
     angle = np.arctan2(geometry[rows.COSINE], entry * geometry[rows.SINE])
@@ -71,7 +96,7 @@ def touching_angle(robot: Robot, pose: Pose) -> Array:
 
 
 def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = None) -> None:
-    """Refuse poses at which a cable has no chord, because its ends coincide or there is no tangent to its pulley."""
+    """Refuse poses at which both ends of a cable coincide, or no tangent to the pulley exists."""
     chord = (chord_geometry(robot, pose) if geometry is None else geometry)[:, rows.CHORD]
     missing = np.argwhere(~(chord >= SHORTEST_CHORD))
     if not len(missing):
@@ -79,7 +104,10 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
     row, cable = (int(k) for k in missing[0])
     item = f"pose{f' {row}' if pose.shape else ''}, cable {cable}"
     one, here = (robot if isinstance(robot, Robot) else robot[row]), (pose[row] if pose.shape else pose)
-    radius = float(pulleys_of(one).radius[cable])
+    radius = 0.0 if one.winches is None else float(one.winches.pulley_radius[cable])
+    if has_slanted_axes(one):
+        value, step = "inside its pulley or on its near side", "Move the platform away, or correct the pulley."
+        raise CableGeometryError(f"{item}: its platform end", value, f"outside, radius {radius:g} m", step)
     if radius > 0.0:
         raise _inside_pulley(item, one, here, cable, radius)
     raise CableGeometryError(
@@ -91,9 +119,9 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
 
 
 def _inside_pulley(item: str, robot: Robot, pose: Pose, cable: int, radius: float) -> CableGeometryError:
-    """Error for a platform end inside or on its pulley, for which no tangent to the pulley exists."""
+    """Error for a platform end inside or on its pulley, from which no tangent to the pulley exists."""
     away = pose.transform(robot.platform_anchors)[cable] - robot.frame_anchors[cable]
-    ahead = float(pulleys_of(robot).entry[cable] * away[2])  # direction from drum to pulley at the entry
+    ahead = float(pulleys_of(robot).entry[cable] * away[2])  # height above the anchor, in the direction of entry
     half = np.sqrt(max(radius**2 - max(ahead, 0.0) ** 2, 0.0))
     near = f"< {radius - half:.6g} m or " if ahead > 0.0 else ""
     return CableGeometryError(

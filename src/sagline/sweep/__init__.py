@@ -1,4 +1,4 @@
-"""Sweeps: every robot at every pose under every wrench, computed by workers of Dask, with results in a folder."""
+"""Sweeps: computations for all combinations of robots, poses and wrenches, in parallel, with results in a folder."""
 
 from sagline.core.surface import group
 

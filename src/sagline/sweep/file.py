@@ -17,7 +17,7 @@ from sagline.files.path_file import load_path
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text, value_errors
 from sagline.files.robot_file import load_robot
-from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, units_of, validate
+from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -25,13 +25,13 @@ from sagline.sweep.request import Request
 from sagline.tension.methods import method_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
-KEYS: Final = ("low", "high", "count")  # keys of an axis: its two ends, and the number of points
+KEYS: Final = ("low", "high", "count")  # keys of an axis: first point, last point and number of points
 MOST: Final = 1_000_000  # largest number of points along an axis
-_POINT_BYTES: Final = 400.0  # memory per point of a grid while poses are made [bytes]
+_POINT_BYTES: Final = 400.0  # [bytes], memory per point of a grid during the construction of poses
 
 
 class _Grid(YamlEntry):
-    """A grid of poses; each coordinate is a value or an axis."""
+    """Grid of poses in a sweep file; each coordinate is one value or an axis."""
 
     x: Annotated[Any, "m"]
     y: Annotated[Any, "m"]
@@ -47,7 +47,7 @@ class _Poses(YamlEntry):
 
 
 class _Loads(YamlEntry):
-    """A grid of forces and moments; each component is a value or an axis."""
+    """Grid of forces and moments in a sweep file; each component is one value or an axis."""
 
     force_x: Annotated[Any, "N"] = 0.0
     force_y: Annotated[Any, "N"] = 0.0
@@ -63,7 +63,7 @@ class _Wrenches(YamlEntry):
 
 
 class _Around(YamlEntry):
-    """Loads around each wrench: the largest force and moment components, each as one number or three numbers."""
+    """Box of loads around each wrench: largest force and moment components, as one number or three numbers each."""
 
     force: Annotated[Any, "N"] = 0.0
     moment: Annotated[Any, "N*m"] = 0.0
@@ -81,10 +81,10 @@ class _SweepEntry(YamlEntry):
 
 
 def load_sweep(file: os.PathLike[str] | str) -> Request:
-    """Read the request of a sweep from a file.
+    """Read a sweep file.
 
-    A sweep file is YAML. A quantity is a number in SI units, or a text with its unit. A quantity that varies is an
-    axis, with two ends and the number of points.
+    A sweep file is YAML. A quantity is a number in SI units, or a text with its unit. A quantity that varies is an axis
+    with low end, high end and number of points.
 
         robots: [cogiro, own_robot.yaml]       # presets, and files in the same folder
         poses:
@@ -105,7 +105,7 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
         file: The file.
 
     Returns:
-        The request.
+        Request of the sweep.
 
     Raises:
         FileError: If the file cannot be read, or if it is not a valid request; the message names the key.
@@ -142,13 +142,13 @@ def _robots(given: Any, folder: Path) -> list[Robot]:
 
 
 def _beside(name: str, folder: Path) -> str | Path:
-    """Path of a robot file, which is relative to the folder of the sweep file; the name of a preset is not changed."""
+    """Path of a robot file, relative to the folder of the sweep file; the name of a preset is returned unchanged."""
     return folder / name if Path(name).suffix.lower() in (".yaml", ".yml") else name
 
 
 def _poses(given: _Poses, folder: Path) -> Pose:
     if (given.grid is None) == (given.path is None):
-        both = "given by grid and path" if given.grid is not None else "given by nothing"
+        both = "given by grid and path" if given.grid is not None else "not given"
         raise InvalidValueError("poses", both, "a grid, or a path", "Give one of the two.")
     if given.path is not None:
         return load_path(folder / file_path(given.path, "poses.path")).pose
@@ -161,11 +161,11 @@ def _wrenches(given: _Wrenches | None) -> Array | None:
     if given is None:
         return None
     if (given.grid is None) == (given.rows is None):
-        both = "given by grid and rows" if given.grid is not None else "given by nothing"
+        both = "given by grid and rows" if given.grid is not None else "not given"
         raise InvalidValueError("wrenches", both, "a grid, or rows", "Give one of the two, or leave wrenches out.")
     if given.grid is not None:
         return _product(given.grid, "wrenches.grid.")
-    units = units_of(_Loads)
+    units = _Loads.units()
     rows = []
     for k, row in enumerate(given.rows or ()):
         if not isinstance(row, list) or len(row) != len(units):
@@ -183,7 +183,7 @@ def _one(given: Any, item: str, unit: str) -> float:
 
 
 def _axis(given: Any, item: str, unit: str) -> Array:
-    """Points of an axis, or a single value."""
+    """Points of an axis, or a single value, from an entry of the file."""
     if not isinstance(given, dict):
         return np.array([_one(given, item, unit)])
     if set(given) != set(KEYS):
@@ -198,8 +198,8 @@ def _axis(given: Any, item: str, unit: str) -> Array:
 
 
 def _product(grid: _Grid | _Loads, within: str) -> Array:
-    """All points of a grid, shape (N, axes), in SI; the last axis varies fastest."""
-    axes = [_axis(getattr(grid, name), within + name, unit) for name, unit in units_of(type(grid)).items()]
+    """All points (N, axes) of a grid in SI units; the last axis varies fastest."""
+    axes = [_axis(getattr(grid, name), within + name, unit) for name, unit in type(grid).units().items()]
     count = int(np.prod([float(len(axis)) for axis in axes]))
     check_memory(f"a grid of {count:,} points", _POINT_BYTES * count, "Give fewer points.")
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))

@@ -1,7 +1,7 @@
-"""Folders of sweeps: a Zarr group with the request and, for each task, one chunk of every variable.
+"""Folders of sweeps: a Zarr group with the request, and with one chunk per variable and task.
 
-The folder contains the exact request. Therefore, the number of a task is sufficient to compute the task on any computer
-with access to the folder. The checksum of a chunk shows whether the chunk is complete.
+The folder contains the whole request. A computer with access to the folder therefore needs only the number of a task to
+compute the task. The checksum of a chunk shows whether the chunk is complete.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.cables.models import MODELS
+from sagline.cables.models import models_by_name
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.netcdf import Format, choice_attributes, choice_of
@@ -29,7 +29,7 @@ from sagline.files.variables import Quantity
 from sagline.files.writing import staging
 from sagline.robot.pose import Pose
 from sagline.sweep.request import Request, RequestBox, variables_of
-from sagline.tension.methods import METHODS
+from sagline.tension.methods import methods_by_name
 from sagline.workspaces.wrench_sets import WrenchSet
 
 if TYPE_CHECKING:
@@ -46,13 +46,13 @@ FORMAT: Final = Format(
 )
 DIMENSIONS: Final = ("robot", "pose", "wrench")
 GROUP: Final = "numbers.zarr"  # name of the request in the folder
-UNASKED: Final = -1  # status of requests that have not been computed yet
-GIVEN: Final = {  # dimensions and units of the arrays of the request
+UNASKED: Final = -1  # status of a request that is not computed yet
+GIVEN: Final = {  # dimensions and unit of each array in the request
     "position": ("pose", "axis", "m"),
     "quaternion": ("pose", "quaternion_part", "1"),
     "wrench": ("wrench", "wrench_part", "N, N m"),
 }
-SHAPES: Final = {  # dimensions of the arrays of a set of loads
+SHAPES: Final = {  # dimensions of each array in a set of loads
     "center": (6,),
     "segments": (-1, 6),
     "ellipsoids": (-1, 6, 6),
@@ -64,18 +64,18 @@ STEP: Final = "Free some space or correct the permissions, and run the same swee
 
 
 class SweepFolder(NamedTuple):
-    """An open folder of a sweep."""
+    """Open folder of a sweep."""
 
     path: Path
     group: Group  # Zarr group
     request: Request
     digest: str  # digest of the request
-    size: tuple[int, int]  # numbers of poses and wrenches of a task, which has one robot
-    made_by: str  # version of sagline
+    size: tuple[int, int]  # numbers of poses and wrenches in a task; a task has one robot
+    made_by: str  # version of sagline that created the folder
 
     @property
     def grid(self) -> tuple[int, int, int]:
-        """Numbers of tasks along the axes of robots, poses and wrenches."""
+        """Numbers of tasks along the three axes: robots, poses and wrenches."""
         robots, poses, wrenches = self.request.shape
         return robots, math.ceil(poses / self.size[0]), math.ceil(wrenches / self.size[1])
 
@@ -85,7 +85,7 @@ class SweepFolder(NamedTuple):
         return math.prod(self.grid)
 
     def part(self, number: int) -> RequestBox:
-        """Box of requests that a task computes."""
+        """Box of requests that the task `number` computes."""
         _, poses, wrenches = self.request.shape
         robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
         tall, wide = self.size
@@ -93,12 +93,12 @@ class SweepFolder(NamedTuple):
         return RequestBox(robot, rows, slice(column * wide, min((column + 1) * wide, wrenches)))
 
     def write(self, number: int, numbers: Mapping[str, NDArray[np.generic]]) -> None:
-        """Write the chunks of a task, each of them atomically; FileError if a chunk cannot be written."""
+        """Write the chunks of a task, each atomically; raises FileError if a chunk cannot be written."""
         robot, rows, columns = self.part(number)
         try:
             for name, values in numbers.items():
                 array: Any = self.group[name]
-                # also write chunks that have only fill values
+                # Zarr would otherwise not write chunks of fill values
                 array.with_config({"write_empty_chunks": True})[robot, rows, columns] = values
         except OSError as error:
             raise FileError(self.path, f"cannot be written ({error.strerror or error})", STEP) from None
@@ -115,13 +115,13 @@ class SweepFolder(NamedTuple):
                 return None
             try:
                 numbers[variable.name] = np.asarray(array[robot, rows, columns])
-            except (ValueError, RuntimeError, OSError):  # errors of the checksum, the decompression, and the disk
+            except (ValueError, RuntimeError, OSError):  # errors of checksum, decompression and disk
                 return None
         return numbers
 
 
 def make_folder(path: Path, request: Request, size: tuple[int, int]) -> None:
-    """Create the folder of a sweep atomically; FileError or InvalidValueError if the request cannot be written."""
+    """Create the folder of a sweep atomically; raises an error if the request cannot be written."""
     check_package("zarr", "sweeps")
     texts = [dump_robot(robot) for robot in request.robots]
     options = _options(request)
@@ -139,13 +139,13 @@ def make_folder(path: Path, request: Request, size: tuple[int, int]) -> None:
             os.replace(place / path.name, path)
     except OSError as error:
         if error.errno in (errno.ENOTEMPTY, errno.EEXIST):
-            return  # another process has created the folder in the meantime; opening it will check it
+            return  # another process has created the folder, which is checked when it is opened
         reason = f"cannot be created ({error.strerror or error})"
         raise FileError(path, reason, "Check its name, the permissions and the space on the disk.") from None
 
 
 def open_folder(path: Path) -> SweepFolder:
-    """Open the folder of a sweep, and read its request; FileError if there is no sweep, or if it is damaged."""
+    """Open the folder of a sweep and read the request; raises FileError for a missing or damaged sweep."""
     import zarr
 
     check_package("zarr", "sweeps")
@@ -165,8 +165,8 @@ def open_folder(path: Path) -> SweepFolder:
             Pose.from_quaternion(given["position"][:], given["quaternion"][:]),
             given["wrench"][:],
             attributes["quantities"],
-            model=choice_of(path, attributes, "model", MODELS),
-            tension=choice_of(path, attributes, "tension", METHODS),
+            model=choice_of(path, attributes, "model", models_by_name()),
+            tension=choice_of(path, attributes, "tension", methods_by_name()),
             around=_set_of(attributes["around"]),
             moment_arm=attributes["moment_arm"],
         )
@@ -182,12 +182,12 @@ def open_folder(path: Path) -> SweepFolder:
 
 
 def request_digest(request: Request) -> str:
-    """Digest of a request; it is equal for the same robots, poses, wrenches, quantities and methods."""
+    """Digest of a request. Requests with equal robots, poses, wrenches, quantities and methods have equal digests."""
     return _digest([dump_robot(robot) for robot in request.robots], _options(request), request)
 
 
 def check_made_here(folder: SweepFolder) -> None:
-    """Raise FileError for a sweep of another version of sagline, because its numbers may differ."""
+    """Raise FileError if another version of sagline, which may give other numbers, created the folder."""
     here = f"sagline {version('sagline')}"
     if folder.made_by != here:
         step = f"Finish the sweep with {folder.made_by}, or sweep into another folder."
@@ -200,18 +200,18 @@ def is_installed(package: str) -> bool:
 
 
 def check_package(name: str, purpose: str) -> None:
-    """Raise InvalidValueError if an optional package is missing; the message contains the command that installs it."""
+    """Raise InvalidValueError with an installation command if the optional package `name` is missing."""
     if not is_installed(name):
         step = 'Install it: pip install "sagline[sweep]".'
         raise InvalidValueError(f"the package {name}", "not installed", f"installed, for {purpose}", step)
 
 
 def _options(request: Request) -> dict[str, Any]:
-    """Values of a request for JSON; robots and arrays are left out."""
+    """Dictionary of a request's values for JSON, without robots and arrays."""
     options = {
         "quantities": list(request.quantities),
-        **choice_attributes("model", request.model, MODELS),
-        **choice_attributes("tension", request.tension, METHODS),
+        **choice_attributes("model", request.model, models_by_name()),
+        **choice_attributes("tension", request.tension, methods_by_name()),
         "around": {name: getattr(request.around, name).tolist() for name in SHAPES},
         "moment_arm": request.moment_arm,
     }
@@ -219,7 +219,7 @@ def _options(request: Request) -> dict[str, Any]:
 
 
 def _set_of(written: Mapping[str, Any]) -> WrenchSet:
-    """Wrench set from the values that `_options` has written."""
+    """Wrench set from a dictionary that `_options` has created."""
     kinds = {name: np.int64 if name == "sizes" else np.float64 for name in SHAPES}
     return WrenchSet(*(locked(np.array(written[name], kinds[name]).reshape(SHAPES[name])) for name in SHAPES))
 
@@ -232,7 +232,7 @@ def _digest(texts: list[str], options: Mapping[str, Any], request: Request) -> s
 
 
 def _arrays(request: Request) -> dict[str, NDArray[np.float64]]:
-    """Arrays of a request, in the order of GIVEN."""
+    """Arrays of a request, in the order of `GIVEN`."""
     return dict(zip(GIVEN, (request.poses.position, request.poses.quaternion, request.wrenches), strict=True))
 
 
@@ -267,7 +267,7 @@ def _fill(place: Path, request: Request, size: tuple[int, int], attributes: dict
 
 
 def _attributes(variable: Quantity) -> dict[str, Any]:
-    """Attributes of a variable by the CF conventions, with the status of requests that are not computed yet."""
+    """Attributes of a variable by the CF conventions, with a status for requests that are not computed yet."""
     found = variable.attributes
     if variable.codes is not None:
         found["flag_values"] = [UNASKED, *found["flag_values"].tolist()]
@@ -276,5 +276,5 @@ def _attributes(variable: Quantity) -> dict[str, Any]:
 
 
 def unknown_value(variable: Quantity) -> float:
-    """Value of a variable for requests that have not been computed yet."""
+    """Fill value of a variable: the value for requests that are not computed yet."""
     return UNASKED if variable.type == np.int8 else math.nan

@@ -1,4 +1,4 @@
-"""Requests of sweeps: all combinations of robots, poses and wrenches, and the quantities to compute."""
+"""Request of a sweep: robots, poses, wrenches, and the quantities to compute for all combinations."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sagline.tension.methods import DEFAULT, method_of
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
-_CABLE: Final = ("cable",)  # dimension after robot, pose and wrench
+_CABLE: Final = ("cable",)  # last dimension, after robot, pose and wrench
 _STATUS: Final = Quantity("status", (), "", "status of each request", codes=PoseStatus)
 _CHANGE: Final = "change of force that makes the request feasible"
 _PROOF: Final = Quantity("proof", (), "N", f"proved lower bound of the {_CHANGE}, 0 if it is feasible")
@@ -53,28 +53,27 @@ QUANTITIES: Final = MappingProxyType(
 
 
 def variables_of(quantities: Iterable[str]) -> tuple[Quantity, ...]:
-    """Variables of the given quantities, in their order and without repetitions."""
+    """Names of the variables that contain the given quantities, without repetitions."""
     return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
 
 
-MOST: Final = 1 << 40  # largest number of requests; they take about a year on a hundred cores
+MOST: Final = 1 << 40  # largest number of requests; a hundred cores need about a year for them
 _CATENARY: Final = Catenary()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Request(Result):
-    """Request for every robot at every pose under every wrench, with the quantities to compute.
+    """Request of a sweep: quantities to compute for every robot at every pose under every wrench.
 
     Attributes:
         robots: The R robots.
-        poses: A batch of P poses.
+        poses: Batch of P poses.
         wrenches: External wrenches on the platform, about the center of mass in world axes [N, N m], shape (W, 6).
-        quantities: Quantities, in the order of `sl.sweep.QUANTITIES`: "tension", "length",
-            "shortfall", "margin".
+        quantities: Quantities to compute, in the order of `sl.sweep.QUANTITIES`, such as "tension" or "margin".
         model: Cable model.
-        tension: Tension distribution method; each request is independent of all others.
+        tension: Tension distribution method, applied to each request independently.
         around: Set of loads that is added to each wrench for the margin; None for each wrench alone.
-        moment_arm: Lever arm of the margin's norm [m]; None for each robot's mean lever arm.
+        moment_arm: Lever arm by which the margin divides moments [m]; None for the mean lever arm of each robot.
     """
 
     robots: tuple[Robot, ...]
@@ -98,7 +97,7 @@ class Request(Result):
         around: WrenchSet | None = None,
         moment_arm: float | None = None,
     ) -> None:
-        """Check the request.
+        """Check the arguments of the request.
 
         Args:
             robots: A robot, or a sequence of robots, which may have different numbers of cables.
@@ -108,11 +107,11 @@ class Request(Result):
             model: Cable model.
             tension: Tension distribution method.
             around: Set of loads that is added to each wrench for the margin; None for each wrench alone.
-            moment_arm: Lever arm of the margin's norm [m], >= 0, as in `sl.margin`.
+            moment_arm: Lever arm by which the margin divides moments [m], >= 0, as in `sl.margin`.
 
         Raises:
-            InvalidValueError: If an argument is of the wrong kind or empty, if the tension distribution method is not
-                defined for a robot, or if a robot cannot move to a pose.
+            InvalidValueError: If an argument has a wrong type, or is empty; if the tension distribution method is not
+                defined for a robot; if the motion pattern of a robot does not allow a pose.
         """
         machines = listed(robots, Robot, "robots")
         batch = pose_of(poses, "poses")
@@ -149,16 +148,16 @@ class Request(Result):
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Numbers of robots, poses and wrenches."""
+        """Numbers of robots, poses and wrenches in the request."""
         return len(self.robots), len(self.poses), len(self.wrenches)
 
     def __str__(self) -> str:
-        """Numbers of robots, poses and wrenches."""
+        """Numbers of robots, poses and wrenches in the request."""
         return " x ".join(map(counted, self.shape, ("robot", "pose", "wrench")))
 
     @property
     def cable_count(self) -> int:
-        """Largest number of cables of a robot."""
+        """Largest number of cables of all robots."""
         return max(robot.cable_count for robot in self.robots)
 
     def __len__(self) -> int:
@@ -168,7 +167,7 @@ class Request(Result):
 
 
 class RequestBox(NamedTuple):
-    """A box of requests: the index of a robot, and ranges of poses and wrenches."""
+    """Box of requests: the index of one robot, a range of poses and a range of wrenches."""
 
     robot: int
     poses: slice
@@ -176,11 +175,11 @@ class RequestBox(NamedTuple):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Numbers of poses and wrenches."""
+        """Numbers of poses and wrenches in the box."""
         return self.poses.stop - self.poses.start, self.wrenches.stop - self.wrenches.start
 
     def pieces(self, most: int) -> Iterator[RequestBox]:
-        """Parts of the box with at most `most` requests."""
+        """Smaller boxes with at most `most` requests each, which together are this box."""
         wide = min(self.shape[1], most)
         tall = max(1, most // wide)
         for first in range(self.poses.start, self.poses.stop, tall):

@@ -1,4 +1,4 @@
-"""State of a sweep on the disk: the results, and the file `done`, which has one line per finished task."""
+"""State of a sweep on the disk: results, and the file `done` with one line per finished task."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ NAME: Final = "done"
 HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     lost   progress"
 
 
-# Mark of a finished task: its computing time [s], 0 if its chunks existed, and the outcomes of its requests
+# Mark of a finished task: computing time [s], which is 0 if the chunks existed already, and outcomes of the requests.
 TaskMark: TypeAlias = tuple[float, Counts]
 
 
 def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
-    """Marks of the finished tasks, by the numbers of the tasks; damaged lines are ignored."""
+    """Dictionary from the number of each finished task to its mark; damaged lines are ignored."""
     try:
         lines = (folder.path / NAME).read_bytes().decode("ascii", "replace").splitlines(keepends=True)
     except FileNotFoundError:
@@ -50,15 +50,15 @@ def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
 
 
 class TaskMarks:
-    """The file `done` of a sweep that runs; it is locked for other processes."""
+    """File `done` of a running sweep, locked for other processes."""
 
     def __init__(self, folder: SweepFolder, file: IO[bytes], marks: dict[int, TaskMark]) -> None:
-        """Continue after the given marks; use `open_marks` to make an instance."""
+        """Store the open file and the existing marks; use `open_marks` to create an instance."""
         self._folder, self._file = folder, file
         self.marks = marks
 
     def add(self, number: int, mark: TaskMark, left: float | None) -> None:
-        """Add the mark of a task, with the remaining time of the sweep [s] if this is known."""
+        """Add the mark of the task `number`; left: remaining time of the sweep [s], None if not known."""
         self.marks[number] = mark
         seconds, counts = mark
         progress = f"{len(self.marks)} of {self._folder.tasks}"
@@ -68,7 +68,7 @@ class TaskMarks:
         self._write(text)
 
     def begin(self) -> None:
-        """Write the headings of the columns on a new line."""
+        """Write the headings of the columns to the file, on a new line."""
         size = self._file.seek(0, 2)
         torn = False
         if size:
@@ -88,7 +88,7 @@ class TaskMarks:
 
 @contextmanager
 def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
-    """Open the marks of a folder and lock them; FileError if another process works on this sweep."""
+    """Open and lock the file `done` of a folder; raises FileError if another process works on the sweep."""
     path = folder.path / NAME
     try:
         file = path.open("a+b", buffering=0)
@@ -103,13 +103,13 @@ def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
 
 
 def _total_of(marks: Mapping[int, TaskMark]) -> Counts:
-    """Sum of the counts of all marks."""
+    """Sum of the outcomes of all finished tasks."""
     counts = np.array([counts for _, counts in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
     return Counts(*counts.sum(axis=0).tolist())
 
 
 def _time_text(seconds: float) -> str:
-    """Text of a time, 1:02:03 or 0:07."""
+    """Text of a time, such as 1:02:03 or 0:07."""
     whole = max(0, round(seconds))
     hours, minutes = whole // 3600, whole // 60 % 60
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
@@ -126,7 +126,7 @@ def _mark(line: str) -> tuple[int, TaskMark] | None:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sweep(Result):
-    """Sweep in a folder; results are read from the disk when they are needed.
+    """Results of a sweep in a folder. Values are read from the disk when they are requested.
 
     Attributes:
         folder: Path of the folder.
@@ -160,21 +160,21 @@ class Sweep(Result):
         return tuple(variable.name for variable in variables_of(self.request.quantities))
 
     def values(self, name: str, index: Any = ()) -> NDArray[Any]:
-        """The values of one variable.
+        """Read the values of one variable.
 
         Args:
             name: One of `names`.
-            index: Selection of robots, poses, wrenches and cables by whole numbers, slices, or arrays of whole numbers
-                or booleans, for example (0, slice(10)). Default: all values.
+            index: Selection of robots, poses, wrenches and cables, for example (0, slice(10)). Each element of the
+                index is a whole number, a slice, or an array of whole numbers or booleans. Default: all values.
 
         Returns:
-            Array of shape (R, P, W), or (R, P, W, m) for tensions and lengths, or the part that the index selects.
-            Values are NaN for requests without a solution. For requests that have not been computed yet, values are
-            NaN, and statuses are -1.
+            Array of shape (R, P, W), or (R, P, W, m) for tensions and lengths, or the part that `index` selects. The
+            value of a request without a solution is NaN. Before its computation, a request has the value NaN and the
+            status -1.
 
         Raises:
-            InvalidValueError: If the variable is unknown, if the index is invalid, or if the values need more memory
-                than is available.
+            InvalidValueError: If no variable has this name, if `index` is invalid, or if the values need too much
+                memory.
             FileError: If a chunk is damaged.
         """
         choice(name, "name", self.names)
@@ -196,7 +196,7 @@ class Sweep(Result):
 
     @property
     def field(self) -> Any:
-        """All variables with units and labels, as a Dataset of xarray; values are read when they are needed."""
+        """Dataset of xarray with all variables, units and labels. Values are read when they are requested."""
         import xarray
 
         data: Dataset = xarray.open_zarr(
@@ -209,13 +209,13 @@ class Sweep(Result):
 
 
 def load(folder: os.PathLike[str] | str) -> Sweep:
-    """Open the folder of a sweep; the sweep may still be running.
+    """Open the results of a sweep, which may be running.
 
     Args:
         folder: The folder.
 
     Returns:
-        The sweep.
+        Sweep, from which values can be read.
 
     Raises:
         FileError: If the folder does not contain a sweep, or is damaged.

@@ -1,4 +1,4 @@
-"""Start and continuation of sweeps: in this process, on workers of Dask on this computer, or on those of a cluster."""
+"""Start and continuation of sweeps in this process, on local Dask workers, or on the Dask workers of a cluster."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from sagline.sweep.folder import (
 )
 from sagline.sweep.request import Request
 from sagline.sweep.result import Sweep, TaskMarks, load, open_marks
-from sagline.sweep.work import Counts, found_counts, measured_size, task
+from sagline.sweep.work import Counts, count_outcomes, measured_size, task
 
 MOST_WORKERS: Final = 1024
-FEW: Final = 4  # up to this number, tasks take less time than the start of workers
+FEW: Final = 4  # up to this number of tasks, this process computes them faster than workers start
 Tell = Callable[[str], None]
 
 
@@ -48,29 +48,29 @@ def run(
     progress: Progress | None = None,
     tell: Tell | None = None,
 ) -> Sweep:
-    """Run a sweep and store its results in a folder, or continue a stopped sweep.
+    """Run a sweep, or continue a stopped sweep, and store the results in a folder.
 
-    The folder contains first results after at most a minute, and a file `done` with one line per finished task. The
-    same call continues a stopped sweep, and does not repeat finished tasks. Ctrl-C stops the sweep when the running
-    tasks are finished. A worker that is killed is replaced, and its task is repeated.
+    The first results are in the folder after at most a minute. The file `done` in the folder has one line per finished
+    task. A second call with the same arguments continues a stopped sweep without repeating finished tasks. Ctrl-C stops
+    the sweep as soon as the running tasks are finished. If a worker is killed, another worker repeats its task.
 
     Args:
         request: The request.
-        folder: Path of the folder; a missing folder is created. It may contain the same sweep, but no other files.
-        workers: Number of worker processes on this computer; None for one per processor. No workers are started if the
-            number is 1, if Dask is missing, or if there are at most four tasks. Then this process computes the tasks
-            one after the other.
-        scheduler: Address of the Dask scheduler of a cluster, "tcp://10.0.0.1:8786", instead of local workers. All
+        folder: Path of the folder, which is created if missing. An existing folder must be empty or contain the same
+            sweep.
+        workers: Number of worker processes on this computer; None for one per processor. This process computes all
+            tasks itself if `workers` is 1, if Dask is missing, or if there are at most four tasks.
+        scheduler: Address of a cluster's Dask scheduler, such as "tcp://10.0.0.1:8786"; None for local workers. All
             workers of the cluster must have access to the folder under the same name.
         progress: Function that is called with the number of finished tasks and the number of all tasks.
-        tell: Function that is called with messages, for example with the address of the dashboard.
+        tell: Function that is called with a message, for example with the address of the dashboard.
 
     Returns:
         The sweep, as returned by `load`.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, or Zarr is not installed.
-        FileError: If the folder has other contents or cannot be written; finished tasks are kept.
+        InvalidValueError: If an argument has a wrong type, or Zarr is not installed.
+        FileError: If the folder contains other files, or cannot be written; finished tasks are kept.
         SaglineError: If the workers or the scheduler fail; finished tasks are kept.
 
     Examples:
@@ -92,8 +92,8 @@ def run(
     report, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
     check_package("zarr", "sweeps")
     with ExitStack() as entered:
-        # connect before the folder is created, because nothing may be written without a scheduler
-        remote = None if scheduler is None else entered.enter_context(remote_workers(scheduler))
+        # connect first, because no folder may be created if the scheduler cannot be reached
+        remote = None if scheduler is None else entered.enter_context(_remote_workers(scheduler))
         opened = _open_or_make_folder(path, request)
         marks = entered.enter_context(open_marks(opened))
         waiting = _waiting(opened, marks)
@@ -121,7 +121,7 @@ def run(
 
 
 def open_matching_folder(path: Path, request: Request) -> SweepFolder:
-    """Open the folder of a request; raises an error if it contains another request."""
+    """Open the folder of a sweep; raises an error if the folder contains another request than `request`."""
     opened = open_folder(path)
     if opened.digest != request_digest(request):
         step = "Give another folder, or remove this one."
@@ -130,7 +130,7 @@ def open_matching_folder(path: Path, request: Request) -> SweepFolder:
 
 
 def _open_or_make_folder(path: Path, request: Request) -> SweepFolder:
-    """Folder of a request; a missing folder is created."""
+    """Open the folder of a sweep, or create the folder if it is missing."""
     try:
         empty = not path.exists() or not any(path.iterdir())
     except OSError as error:
@@ -143,23 +143,23 @@ def _open_or_make_folder(path: Path, request: Request) -> SweepFolder:
 
 
 def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
-    """Numbers of the remaining tasks; tasks whose chunks are complete on the disk are marked as finished."""
+    """Numbers of the tasks that must be computed; a task with complete chunks on the disk is marked as finished."""
     waiting = []
     for number in range(folder.tasks):
-        counts = found_counts(folder, number)
-        if counts is None:
+        numbers = folder.read(number)
+        if numbers is None:
             marks.marks.pop(number, None)
             waiting.append(number)
         elif number not in marks.marks:
-            marks.add(number, (0.0, counts), None)
+            marks.add(number, (0.0, count_outcomes(numbers)), None)
     return waiting
 
 
 @contextmanager
 def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
-    """Client of Dask with workers on this machine; None if this process computes the tasks one after the other."""
+    """Dask client with workers on this computer; None if this process computes all tasks itself."""
     if count > 1 and tasks > FEW and is_installed("distributed"):
-        # end a worker whose start runs the user's script again; the parent process reports the reason
+        # A worker whose start runs the user's script again must end here. The parent process reports the reason.
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             raise SystemExit(1)
         with local_workers(min(count, tasks), tell) as client:
@@ -170,35 +170,35 @@ def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
         yield None
 
 
-HERE: Final = "127.0.0.1"  # an address that other computers cannot reach
+HERE: Final = "127.0.0.1"  # only processes of this computer can connect to this address
 DASHBOARD: Final = 8787
-PATIENCE: Final = 15.0  # longest wait for a scheduler, and for a worker [s]
-AHEAD: Final = 2  # number of tasks that are sent to each worker, so that the next task is ready when one is finished
-LOOK: Final = 5.0  # time between two checks of the number of workers [s]
+PATIENCE: Final = 15.0  # [s], longest time to wait for a scheduler and for a worker
+AHEAD: Final = 2  # number of tasks that each worker has, so that it need not wait for its next task
+LOOK: Final = 5.0  # [s], time between two checks of the number of workers
 SCHEMES: Final = ("tcp://", "tls://", "ws://", "wss://")
 LOGGERS: Final = ("distributed", "tornado", "bokeh", "asyncio")
 SILENT: Final = logging.CRITICAL + 1
 
-SETTINGS: Final = {  # with this setting, workers keep memory instead of releasing and allocating it for each array
+SETTINGS: Final = {  # workers keep freed memory, because its release and new allocation for each array take time
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 28,
     "distributed.worker.profile.enabled": False,
 }
 
-Job = tuple[str, str]  # arguments of a task: folder and digest
+Job = tuple[str, str]  # folder and digest of the sweep to which a task belongs
 Finish = Callable[[int, float, tuple[int, ...]], None]
 
 
 def cores() -> int:
     """Number of processors that this process may use."""
-    with suppress(AttributeError):  # some systems do not have this function
+    with suppress(AttributeError):  # the function does not exist on all systems
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 @contextmanager
 def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
-    """Start worker processes that only this computer can reach; `tell` is called with the dashboard's address."""
+    """Start local worker processes; the function `tell` is called with the address of the dashboard."""
     with _silence_dask():
         distributed, settings = import_module("distributed"), import_module("dask.config")
         free = _is_free(DASHBOARD)
@@ -225,15 +225,15 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
 
 
 @contextmanager
-def remote_workers(address: str) -> Iterator[Any]:
-    """Connect to the workers of the scheduler at an address, "tcp://10.0.0.1:8786"; SaglineError without workers."""
+def _remote_workers(address: str) -> Iterator[Any]:
+    """Connect to the scheduler at `address`, such as "tcp://10.0.0.1:8786"; SaglineError without workers there."""
     check_address(address)
     check_package("distributed", "a scheduler")
     with _silence_dask():
         distributed = import_module("distributed")
         try:
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-        except (OSError, ValueError, RuntimeError, MemoryError) as error:  # last: another program answers
+        except (OSError, ValueError, RuntimeError, MemoryError) as error:  # MemoryError: another program answers
             step = "Start a scheduler: dask scheduler; and workers: dask worker ADDRESS."
             raise SaglineError(f"No scheduler answers at {address} ({_first_line(error)}). {step}") from None
         with client:
@@ -246,7 +246,7 @@ def remote_workers(address: str) -> Iterator[Any]:
 
 
 def check_address(address: object) -> str:
-    """Checked address of a scheduler."""
+    """Checked text of a scheduler's address."""
     if isinstance(address, str) and address.isprintable() and address.isascii():
         scheme = next((each for each in SCHEMES if address.startswith(each)), None)
         host, _, port = address.removeprefix(scheme or "").rpartition(":")
@@ -256,7 +256,7 @@ def check_address(address: object) -> str:
 
 
 def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
-    """Run tasks on the workers, a few per worker at a time; after an error or Ctrl-C, wait for the running tasks."""
+    """Run the tasks `numbers` on the workers. After an error or Ctrl-C, wait until the running tasks are finished."""
     distributed = import_module("distributed")
     waiting = iter(numbers)
     run = uuid.uuid4().hex[:8]
@@ -274,7 +274,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
             ahead.add(future)
 
     def take(future: Any) -> None:
-        if future.status == "lost":  # the worker ended before its result was fetched; the scheduler repeats the task
+        if future.status == "lost":  # the worker ended before its result was fetched: the task runs again
             ahead.add(future)
             return
         number = which.pop(future)
@@ -299,13 +299,13 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
 
 @contextmanager
 def _silence_dask() -> Iterator[None]:
-    """Suppress Dask's logs and warnings in the block; after a failure, also the logs that come later."""
+    """Context manager that suppresses Dask's logs and warnings; after a failure, later logs are also suppressed."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
         if is_installed("distributed"):
-            import_module("distributed")  # the import configures the loggers, and must not follow the next lines
+            import_module("distributed")  # imported first, because the import configures the loggers
         for logger in loggers:
             logger.setLevel(SILENT)
         yield
@@ -343,7 +343,7 @@ def _first_line(error: BaseException) -> str:
 
 
 def dask_setup(worker: object) -> None:
-    """Ignore SIGINT in a worker process, so that it finishes its task; Dask calls this function by its name."""
+    """Ignore SIGINT in a worker, so that Ctrl-C does not stop its task; Dask calls this function by its name."""
     if threading.current_thread() is threading.main_thread():
         with suppress(ValueError, OSError):
             signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Tasks of a sweep: functions of the request and of the number of the task."""
+"""Tasks of a sweep: computation of a part of the request, and size of the tasks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import FileError
 from sagline.kernels import codes, tables
-from sagline.kernels.inverse.feasibility import PROVED
 from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, decide_rows, solve_inverse_rows
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
@@ -24,10 +23,10 @@ from sagline.sweep.request import Request, RequestBox, variables_of
 from sagline.tension.method import Options, kernel_options
 from sagline.workspaces.margin import MarginRows, MarginStatus
 
-# statuses of feasible, infeasible, open and lost requests
+# statuses of requests that count as feasible, infeasible, open and lost
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
 MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # none is lost
-ROWS: Final = 1 << 14  # number of requests per call; their arrays fit into the cache of the processor
+ROWS: Final = 1 << 14  # number of requests per call, whose arrays fit into the processor's cache
 
 
 class Counts(NamedTuple):
@@ -35,10 +34,10 @@ class Counts(NamedTuple):
 
     Attributes:
         feasible: Number of requests with tensions within the limits.
-        infeasible: Number of requests with a proof that no such tensions exist.
-        unable: Number of requests without a result for other reasons; the status states the reason.
-        open: Number of requests that are too close to the boundary for a verdict.
-        lost: Number of requests without a verdict.
+        infeasible: Number of requests with a proof that no tensions within the limits exist.
+        unable: Number of requests that have no result for another reason, which the status states.
+        open: Number of requests that are too close to the boundary of feasibility for a verdict.
+        lost: Number of requests without a verdict because a method failed.
     """
 
     feasible: int
@@ -49,7 +48,7 @@ class Counts(NamedTuple):
 
 
 def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[np.generic]]:
-    """All variables of a part, by name, (poses, wrenches[, cables]); missing cables and results have NaN."""
+    """Variables of a part by name, (poses, wrenches[, cables]); NaN for missing results and for missing cables."""
     variables = variables_of(request.quantities)
     shape = part.shape
     filled: dict[str, NDArray[np.generic]] = {}
@@ -73,7 +72,7 @@ def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[n
 
 
 def count_outcomes(numbers: dict[str, NDArray[np.generic]]) -> Counts:
-    """Counts of the outcomes of a part, from its variables."""
+    """Number of requests for each outcome in a part with the variables `numbers`."""
     name, ends = ("status", INVERSE_ENDS) if "status" in numbers else ("margin_status", MARGIN_ENDS)
     status = numbers[name]
     feasible, infeasible, left, lost = (int(np.count_nonzero(status == int(code))) for code in ends)
@@ -81,14 +80,14 @@ def count_outcomes(numbers: dict[str, NDArray[np.generic]]) -> Counts:
 
 
 class _Inverse:
-    """Function that computes statuses, tensions and lengths for one robot; it is prepared once."""
+    """Solver for statuses, tensions and lengths of one robot, prepared once."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request, self._robot = request, robot
         self._options = kernel_options(robot, request.model, request.tension)
 
     def answers(self, part: RequestBox) -> dict[str, NDArray[Any]]:
-        """Variables of a part, (N,) or (N, m)."""
+        """Variables by name for the N requests of a part, (N,) or (N, m)."""
         request = self._request
         poses, loads = _rows(request.poses, part.poses), request.wrenches[part.wrenches]
         rows = locked(np.repeat(poses, len(loads), axis=0))
@@ -99,9 +98,9 @@ class _Inverse:
         if "shortfall" in request.quantities:
             decide_rows(robot_terms(self._robot), self._options, rows, wrenches, found)
             answers["enough"] = found.shortfall
-            answers["proof"] = found.brackets[:, PROVED]
+            answers["proof"] = found.brackets[:, tables.PROVED]
         else:
-            answers["proof"] = proofs_of(self._robot, self._options, poses, loads, found)
+            answers["proof"] = _proofs_of(self._robot, self._options, poses, loads, found)
         answers["status"] = found.pose_status
         answers["tension"] = found.results[tables.TENSION]
         answers["length"] = found.results[tables.LENGTH]
@@ -109,14 +108,14 @@ class _Inverse:
 
 
 class _Margins:
-    """Function that computes margins for one robot; it is prepared once."""
+    """Solver for the margins of one robot, prepared once."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request = request
         self._rows = MarginRows(robot, request.around, request.model, request.moment_arm)
 
     def answers(self, part: RequestBox) -> dict[str, NDArray[Any]]:
-        """Variables of a part, (N,)."""
+        """Variables by name for the N requests of a part, (N,)."""
         poses = _rows(self._request.poses, part.poses)
         found = [self._rows.about(load).rows(poses) for load in self._request.wrenches[part.wrenches]]
         columns: dict[str, list[NDArray[Any]]] = {
@@ -130,30 +129,30 @@ class _Margins:
 
 
 def _rows(poses: Pose, part: slice) -> Array:
-    """Poses with unchanged rows; the constructor of Pose would normalize the quaternions again."""
+    """Poses of a part with unchanged numbers, because the constructor of `Pose` would normalize quaternions again."""
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
-# solvers and their quantities
+# class of each solver, and quantities that it computes
 SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
     _Inverse: frozenset({"tension", "length", "shortfall"}),
     _Margins: frozenset({"margin"}),
 }
 
 
-SECONDS: Final = 0.75  # duration of a task [s], a hundred times the time that the scheduler needs for it
-LONGEST: Final = 10.0  # longest duration of a task [s], in sweeps of several days
-TASKS: Final = 4000  # number of tasks above which tasks become longer, up to the longest duration
-LARGEST: Final = 1 << 26  # largest output of a task [bytes]
-SAMPLES, SAMPLE = 16, 4096  # number of parts whose time is measured, and number of requests per part
-TIMED: Final = 0.5  # time [s] that is sufficient to measure the time per request
+SECONDS: Final = 0.75  # [s], duration of a task; the scheduler needs a hundredth of this time per task
+LONGEST: Final = 10.0  # [s], longest duration of a task, for sweeps that take days
+TASKS: Final = 4000  # sweeps with more tasks get longer tasks instead, up to the longest duration
+LARGEST: Final = 1 << 26  # [bytes], largest output of a task
+SAMPLES, SAMPLE = 16, 4096  # number of parts with a measured time, number of requests per part
+TIMED: Final = 0.5  # [s], sufficient time to measure the time per request
 
 
 def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]:
-    """Compute one task of a folder and write its chunks; returns its computing time [s] and outcomes."""
+    """Compute the task `number` and write its chunks; returns its computing time [s] and the outcomes."""
     start = time.perf_counter()
     opened = _opened(folder, digest)
-    numbers = opened.read(number)  # a worker has completed the chunks, but ended before its report
+    numbers = opened.read(number)  # a worker ended after it had written all chunks
     if numbers is None:
         numbers = compute_variables(opened.request, opened.part(number))
         opened.write(number, numbers)
@@ -162,29 +161,23 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
 
 @lru_cache(maxsize=4)
 def _opened(folder: str, digest: str) -> SweepFolder:
-    """Open a folder and check its digest; the folder stays open for the next tasks."""
+    """Folder of a sweep, which stays open for the next tasks; raises an error if its digest is not `digest`."""
     found = open_folder(Path(folder))
     if found.digest != digest:
         step = "Give all workers access to the same folder under the same name."
-        raise FileError(folder, "contains another sweep on the machine of a worker", step)
+        raise FileError(folder, "contains another sweep when a worker opens it", step)
     check_made_here(found)
     return found
 
 
-def found_counts(folder: SweepFolder, number: int) -> Counts | None:
-    """Counts of the outcomes of a task, from its chunks on the disk; None if a chunk is missing or incomplete."""
-    numbers = folder.read(number)
-    return None if numbers is None else count_outcomes(numbers)
-
-
 def measured_size(request: Request) -> tuple[int, int]:
-    """Task size (poses, wrenches) that gives a suitable duration, from the measured time of some requests."""
+    """Numbers of poses and wrenches per task for a suitable duration, from the measured time of some requests."""
     places = np.linspace(0, len(request) - 1, min(SAMPLES, len(request))).astype(np.int64)
     parts = [_sample(place, request) for place in np.transpose(np.unravel_index(places, request.shape))]
-    compute_variables(request, parts[0])  # the first call loads the machine code
+    compute_variables(request, parts[0])  # first call: loads the machine code
     count, seconds = 0, 0.0
     for part in parts:
-        start = time.process_time()  # processor time, which does not depend on other processes
+        start = time.process_time()  # processor time does not depend on other processes
         compute_variables(request, part)
         seconds += time.process_time() - start
         count += part.shape[0] * part.shape[1]
@@ -198,13 +191,13 @@ def measured_size(request: Request) -> tuple[int, int]:
 
 
 def _size(rows: int, poses: int, wrenches: int) -> tuple[int, int]:
-    """Task size for a number of requests; if possible, a task has all wrenches of a pose, because they share proofs."""
+    """Numbers of poses and wrenches in a task of `rows` requests; wrenches of a pose stay together if possible."""
     wide = min(wrenches, rows)
     return min(poses, max(1, rows // wide)), wide
 
 
 def _sample(place: Indices, request: Request) -> RequestBox:
-    """A box of a few requests that starts at the indices (3,) of a robot, a pose and a wrench."""
+    """Box of at most `SAMPLE` requests, which begins at the indices (3,) of a robot, a pose and a wrench."""
     robot, pose, wrench = (int(k) for k in place)
     _, poses, wrenches = request.shape
     tall, wide = _size(SAMPLE, poses, wrenches)
@@ -212,16 +205,16 @@ def _sample(place: Indices, request: Request) -> RequestBox:
     return RequestBox(robot, slice(first, first + tall), slice(left, left + wide))
 
 
-ITERATIONS: Final = 32  # largest number of proofs per pose that are applied to the other loads
-TRUST: Final = 1e-8  # smallest gap relative to the forces: ten times a verdict's tolerance, far above rounding errors
+ITERATIONS: Final = 32  # largest number of proofs at a pose that are tried for other loads
+TRUST: Final = 1e-8  # smallest gap of a valid proof, relative to the forces: ten times the tolerance of a verdict
 
 
-def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
-    """Decide the requests that the tension distribution left without a verdict, and complete the feasible ones.
+def _proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
+    """Decide requests that the tension distribution could not decide; complete the results of feasible requests.
 
-    Poses are rows (P, POSE_COLUMNS), and loads have the shape (W, 6). The P W requests in `found` are all loads at the
-    first pose, then all loads at the next pose, and so on. Returns a proved lower bound of the necessary change of the
-    force [N], (P W,): 0 if the request is feasible, and NaN if it has no result for another reason.
+    The arguments are pose rows (P, POSE_COLUMNS), loads (W, 6), and the results `found` of P W requests: all loads at
+    the first pose, then all loads at the next pose, and so on. Returns (P W,) proved lower bounds of the change of
+    force [N] that makes a request feasible: 0 for a feasible request, NaN for a request without a result.
     """
     proof = np.full(found.pose_status.size, np.nan)
     proof[found.pose_status == codes.POSE_SOLVED] = 0.0
@@ -246,12 +239,12 @@ def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found:
 
 
 def _shares(robot: Robot, loads: Array) -> bool:
-    """True if proofs can be shared: there are several loads, and all cables have upper tension limits."""
+    """True if there are several loads and all upper limits are finite, so that one proof may decide several loads."""
     return len(loads) > 1 and bool(np.isfinite(robot.tension_max).all())
 
 
 def _forces_at_hand(robot: Robot, loads: Array) -> Array:
-    """Upper bound of the forces at each load [N], (W,); moments are divided by the smallest lever arm."""
+    """Upper bound (W,) of the forces of cables and load [N]; moments are divided by the smallest lever arm."""
     arms = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1)
     arm = float(arms[arms > 0.0].min(initial=np.inf))
     moments = np.abs(loads[:, 3:]).sum(axis=1) / arm
@@ -261,7 +254,7 @@ def _forces_at_hand(robot: Robot, loads: Array) -> Array:
 
 
 def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) -> Array:
-    """Gap (K, W) [N] of all loads at K poses, for the proof of one load per pose; -inf without a proof."""
+    """Gaps (K, W) [N] by the proof of one load at each of K poses: a load with a positive gap is infeasible."""
     proved, direction, known = verdicts
     own = proved + np.einsum("kn,kn->k", direction, along[columns])
     gap = own[:, None] - direction @ along.T
@@ -271,7 +264,7 @@ def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) 
 def _decide(
     robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows, which: Indices, proof: Array
 ) -> tuple[Array, Array, Flags]:
-    """Decide some requests; returns proved lower bounds, directions of the proofs, and a mask of proved requests."""
+    """Decide the requests `which`; returns proved lower bounds, directions of proofs, and True for proved requests."""
     rows = locked(poses[which // len(loads)])
     wrenches = locked(loads[which % len(loads)])
     some = InverseRows.empty(robot, len(which))
@@ -280,7 +273,7 @@ def _decide(
     decide_rows(robot_terms(robot), options, rows, wrenches, some)
     found.results[:, which] = some.results
     found.pose_status[which] = some.pose_status
-    proved = some.brackets[:, PROVED]
+    proved = some.brackets[:, tables.PROVED]
     proof[which] = proved
     known = (some.pose_status == codes.POSE_INFEASIBLE) & (proved > 0.0) & np.isfinite(proved)
     known &= np.isfinite(some.farkas).all(axis=1)

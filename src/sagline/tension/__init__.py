@@ -1,4 +1,4 @@
-"""Tension distribution for redundant cables: methods, limits, and polygon of feasible tensions."""
+"""Tension distribution for redundant cables: methods, margins, and polygon of feasible tensions."""
 
 from sagline.core.surface import group
 

@@ -1,4 +1,4 @@
-"""Margins of a pose: distance of tensions from their limits, largest additional load, and unconstrained motion."""
+"""Margins of a pose: distance between tensions and limits, largest additional load, and unconstrained motion."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from sagline.statics.balance import structure_matrix
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import LIMITS_OF
 
-BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
+BLOCK = 1 << 12  # number of poses per block, which takes about 0.1 s; Ctrl-C is handled between blocks
 
 
 @of_equilibrium
 def limit_margin(state: Equilibrium) -> Array:
-    """Distance between the tensions of each pose and their nearest limit.
+    """Compute the smallest distance between tensions and tension limits at each pose.
 
     Args:
         state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
 
     Returns:
-        Smallest distance [N] between the tension of a cable and its limits, shape () or (N,); 0 if a cable is at its
-        limit, NaN for a pose without tensions. The distance depends on the tension distribution.
+        Smallest distance [N] between the tension of any cable and its limits, shape () or (N,); 0 if a cable is at a
+        limit, NaN for a pose without tensions. The distance depends on the tension distribution method.
 
     Raises:
         InvalidValueError: If `state` has another type.
@@ -48,7 +48,7 @@ def limit_margin(state: Equilibrium) -> Array:
 
 
 def cable_margins(state: Equilibrium) -> Array:
-    """Distance between the tension of each cable and its nearest limit, (m,) or (N, m) [N]."""
+    """Distances (m,) or (N, m) [N] between the tension of each cable and the nearest limit of this cable."""
     tension, (low, high) = state.limited_tension, robot_fields(state.robot, "tension_min", "tension_max")
     margins: Array = np.minimum(tension - low, high - tension)
     return margins
@@ -56,11 +56,11 @@ def cable_margins(state: Equilibrium) -> Array:
 
 @of_equilibrium
 def capacity_margin(state: Equilibrium) -> Array:
-    """Largest additional force in any direction that tensions within the limits can balance at each pose.
+    """Compute the largest additional force in any direction that tensions within their limits can balance.
 
-    The moment on the platform does not change. The result is exact for weightless cables. For sagging cables, the sag
-    forces of the state are kept constant. The computing time is proportional to the number of faces, which is the
-    binomial coefficient of m over n - 1. For eight cables, 56 faces take about twenty microseconds per pose.
+    The moment on the platform does not change. The result is exact for weightless cables. For sagging cables, constant
+    sag forces are assumed. The computing time is proportional to the number of faces of the available wrench set, which
+    is the binomial coefficient of m over n - 1. The 56 faces of eight cables take about twenty microseconds per pose.
 
     Args:
         state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
@@ -97,13 +97,13 @@ def capacity_margin(state: Equilibrium) -> Array:
 
 
 class UnresistedMotion(NamedTuple):
-    """The platform motion that the cables constrain least.
+    """Platform motion that the cables constrain least.
 
     Attributes:
-        twist: Velocity of the center of mass and angular velocity, world axes, shape (6,). Its angular part has length
-            1; if the platform does not rotate, its linear part has length 1.
-        resistance: Largest rate of a cable length in this motion, divided by the rate in the most constrained motion; 0
-            at a singular pose, except for rounding.
+        twist: Velocity of the center of mass and angular velocity, world axes, shape (6,). The twist is scaled to an
+            angular velocity of 1 or, for a pure translation, to a velocity of 1.
+        resistance: Rate of the cable lengths in this motion divided by the rate in the most constrained motion; 0 at a
+            singular pose, except for rounding.
         text: Description of the motion in words.
     """
 
@@ -113,14 +113,14 @@ class UnresistedMotion(NamedTuple):
 
 
 def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
-    """Motion of the platform with the smallest change of the cable lengths. At a singular pose this change is zero.
+    """Compute the platform motion with the smallest change of cable lengths, which is zero at a singular pose.
 
     Args:
         robot: The robot.
         pose: One pose.
 
     Returns:
-        UnresistedMotion: the twist, the resistance of the cables to this twist, and a description in words.
+        UnresistedMotion with the twist, the resistance of the cables to this twist, and a description in words.
 
     Raises:
         InvalidValueError: If `pose` is not a single pose.
@@ -137,8 +137,8 @@ def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
     lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
     units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
     structure = units[:, None] * structure_matrix(robot, pose)
-    # The right singular vectors form an (m, m) matrix. They are computed only if the left singular vectors are not
-    # complete.
+    # The (m, m) matrix of right singular vectors is large. It is needed only if the left singular vectors are
+    # incomplete.
     left, values, _right = np.linalg.svd(structure, full_matrices=structure.shape[1] < structure.shape[0])
     twist = robot.freedom.T @ (units * left[:, -1])
     linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])

@@ -1,22 +1,24 @@
-"""Interface of all tension distribution methods, and their data for kernels."""
+"""Base class of all tension distribution methods, and data of the methods for kernels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.core.arguments import choice, word_of
-from sagline.core.arrays import Array, locked, number
+from sagline.core.arrays import Array, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kernels.inverse.poses import DistributionTerms, LimitTerms, ModelTerms
 from sagline.robot.batch import Robots, first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from sagline.kernels.inverse.poses import DistributionTerms, LimitTerms, ModelTerms
 
 Variable = Literal["chord", "horizontal", "frame_end"]
 VARIABLES = {
@@ -25,26 +27,26 @@ VARIABLES = {
     "frame_end": codes.FRAME_END_TENSION,
 }
 
-# rows of the array of cable preferences
-ROOT_WEIGHT, GOAL = 0, 1  # root of the weight of a cable in the sum of squares, and its target tension [N]
+# number of rows of the array of cable preferences
+ROOT_WEIGHT, GOAL = 0, 1  # rows: square root of a cable's weight in the sum of squares; target tension [N]
 PREFERENCE_ROWS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class TensionMethod:
-    """Rule that selects one tension per cable among all feasible tensions. The rule has options, and a kernel code.
+    """Base class of tension distribution methods, which select one of all feasible sets of tensions.
 
     Attributes:
-        code: Code of the method in the kernels (`sagline.kernels.codes`).
-        needs_upper_limits: True if every cable must have a finite upper limit.
-        most_redundant: Largest number of redundant cables for which the method works; None for any number.
-        continuous: True if the tensions change without jumps when the pose changes continuously.
-        variable: The tension variable of the method: "chord" (default), "horizontal" (T_x of the article), or
-            "frame_end" (the tension at the load cell of the winch). Minimum-norm results depend on the variable. A
-            vertical cable has no horizontal tension. A pose directly under an anchor is therefore singular in the
-            variable "horizontal".
-        lowest_point_margin: T_adj of (54) in the article [N]: the bound T_x >= w D/(2 |tan phi|) + T_adj keeps the
-            lowest point of each cable outside its span. None (default): no such bound.
+        code: Code that selects the method in the kernels (`sagline.kernels.codes`), 0 to METHOD_COUNT - 1.
+        needs_upper_limits: True if the method requires a finite upper limit for every cable.
+        most_redundant: Largest number of redundant cables that the method allows; None for any number.
+        continuous: True if the tensions change continuously when the pose changes continuously.
+        variable: Tension variable of the method: "chord" (default), "horizontal" (T_x of the article), or "frame_end"
+            (tension at the load cell of the winch). For example, minimum-norm tensions depend on the variable. A pose
+            directly under an anchor is singular in the variable "horizontal", because a vertical cable has no
+            horizontal tension.
+        lowest_point_margin: T_adj of equation (54) of the article [N]. The bound T_x >= w D/(2 |tan phi|) + T_adj keeps
+            the lowest point of each cable outside its span. None (default): no bound.
     """
 
     code: ClassVar[int]
@@ -59,6 +61,10 @@ class TensionMethod:
         if type(self) is TensionMethod:
             step = "Choose a tension method, for instance MinimumNorm()."
             raise InvalidValueError("TensionMethod()", "the abstract base class", "a tension distribution method", step)
+        code = getattr(self, "code", "missing")
+        if code not in range(codes.METHOD_COUNT):
+            step = "Choose the code of a method that the kernels have: sagline.kernels.codes."
+            raise InvalidValueError(f"{type(self).__name__}.code", code, f"0 to {codes.METHOD_COUNT - 1}", step)
         object.__setattr__(self, "variable", choice(self.variable, "variable", VARIABLES))
         if self.lowest_point_margin is not None:
             margin = number(self.lowest_point_margin, "lowest_point_margin", "N", low=0.0)
@@ -66,28 +72,28 @@ class TensionMethod:
 
     @property
     def alone(self) -> TensionMethod:
-        """Method for a pose without a previous pose: this method, except for `Closest`."""
+        """Method that applies to a pose without a previous pose; only `Closest` has another method for such a pose."""
         return self
 
     @property
     def title(self) -> str:
-        """Name on the command line, followed by the tension variable if the variable is not the chord tension."""
+        """Name of the method on the command line, followed by a tension variable other than the chord tension."""
         of = "" if self.variable == "chord" else f" of {self.variable.replace('_', '-')} tensions"
         return word_of(type(self).__name__) + of
 
     @property
     def parameter(self) -> float:
-        """Numerical parameter, which only some methods have: an exponent, or the code of an optimum."""
+        """Numerical parameter of some methods: an exponent, or the code of an optimum; zero for all other methods."""
         return 0.0
 
     def preference(self, cables: int) -> Array:
-        """Root weights and targets of the cables, for kernels.
+        """Square roots of the cables' weights, and target tensions of the cables, for kernels.
 
         Args:
             cables: Number of cables m.
 
         Returns:
-            Array of shape (PREFERENCE_ROWS, m); targets in N.
+            Array of shape (PREFERENCE_ROWS, m).
         """
         rows = np.zeros((PREFERENCE_ROWS, cables))
         rows[ROOT_WEIGHT] = 1.0
@@ -100,12 +106,12 @@ class TensionMethod:
 
     @property
     def validity(self) -> float:
-        """T_adj for kernels: NaN for None."""
+        """T_adj for kernels; NaN if the option is None."""
         return float("nan") if self.lowest_point_margin is None else float(self.lowest_point_margin)
 
 
 def shared_tension(state: Equilibrium, variable: Variable) -> Array:
-    """Tensions of a state in the variable of the tension distribution method, (m,) or (N, m) [N]."""
+    """Tensions (m,) or (N, m) [N] of a state in the tension variable `variable`."""
     match variable:
         case "chord":
             return state.chord_tension
@@ -118,25 +124,26 @@ LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_
 
 
 class Options(NamedTuple):
-    """Model, method and limits: the first arguments of the kernels."""
+    """First arguments of kernels: cable model, tension distribution method and limits."""
 
     model: ModelTerms  # code, k_h, k_p
-    sharing: DistributionTerms  # method, parameter, variable, root weights and targets of the cables
-    limits: LimitTerms  # limited tension, and the article's T_adj [N] or NaN
+    sharing: DistributionTerms  # code of the method, parameter, variable, preferences of the cables
+    limits: LimitTerms  # code of the limited tension; T_adj [N], or NaN
 
 
 def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> Options:
-    """Model, method and limits: the first arguments of the kernels."""
+    """First arguments of kernels: cable model, tension distribution method and limits."""
     shared = first_of(robot)
     if isinstance(robot, Robot):
         check_sharing(robot, tension)
     else:
         for index, one in enumerate(robot):
             check_sharing(one, tension, f"robot[{index}]")
-    # a weightless cable has the same tension everywhere, so that its frame-end tension is its chord tension
+    # in a weightless cable, the frame-end tension is equal to the chord tension
     alike = model.weightless and tension.variable == "frame_end"
     variable = codes.CHORD_TENSION if alike else tension.variable_code
-    weight, goal = (locked(row) for row in tension.preference(shared.cable_count))
+    item, shape = f"{type(tension).__name__}.preference", (PREFERENCE_ROWS, shared.cable_count)
+    weight, goal = exactly(tension.preference(shared.cable_count), item, "", shape)
     return Options(
         (model.code, *model.parameters),
         (tension.code, tension.parameter, variable, weight, goal),
@@ -145,12 +152,12 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """True if `tension` minimizes the distance to a reference in a linear variable. A shorter kernel does this."""
+    """True for a method that minimizes the distance to a reference in a linear variable, as the default kernel does."""
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
 def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None) -> None:
-    """Refuse `robot` if the tension distribution method `tension` is not defined for it."""
+    """Refuse a robot for which the tension distribution method `tension` is not defined."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     called = name or robot.name
     check_cable_count(robot, called)

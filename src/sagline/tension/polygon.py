@@ -1,4 +1,4 @@
-"""Feasible tensions of one pose, for plots: a polygon in the null space, for up to two redundant cables."""
+"""Polygon of the feasible tensions of one pose in the null space, for up to two redundant cables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.core.table import Columns, Tabular
 
 
 class Side(NamedTuple):
-    """Tension limit that forms a side of the polygon.
+    """Tension limit on which a side of the polygon lies.
 
     Attributes:
         cable: Index of the cable.
@@ -27,26 +27,25 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TensionPolygon(Result, Tabular):
-    """All tensions within their limits that balance one pose: origin + lambda basis, with lambda in the polygon.
+    """All feasible tensions of one pose: origin + lambda basis, where lambda is a point of the polygon.
 
-    For sagging cables the balance depends on the tensions. The polygon then uses the sag forces T_z - tau sin phi at
-    the minimum-norm tensions (docs/model.md, section 5).
+    The sag forces T_z - tau sin phi of sagging cables depend on the tensions. The polygon assumes constant sag forces,
+    computed at the minimum-norm tensions (docs/model.md, section 5).
 
     Attributes:
         vertices: Corners, counter-clockwise, in coordinates of the null space [N], shape (h, 2); Omega_lambda of the
-            article. For one redundant cable, the vertices are the ends of an interval, possibly infinite, shape (2, 1).
-            Without redundant cables, there is one point without coordinates, shape (1, 0). If no tensions are feasible,
-            the shape is (0, r).
+            article. One redundant cable gives the two ends of an interval, which may be infinite, shape (2, 1). Without
+            redundant cables, there is one point without coordinates, shape (1, 0). If no tensions are feasible, the
+            shape is (0, r).
         tensions: Tensions at the vertices [N], in the tension variable, shape (h, m); Omega_t of the article.
-        sides: For each side k, which connects vertices k and k + 1, its tension limit; for an interval, the limit at
-            vertex k. None for a side at infinity, where the polygon is unbounded; the vertices of this side represent
-            infinity.
+        sides: Tension limit of each side; side k connects the vertices k and k + 1. For an interval, tension limit at
+            vertex k. None for a side at infinity, whose vertices represent infinity because the polygon is unbounded.
         bounded: True if no side is at infinity.
         basis: Orthonormal basis of the null space, shape (r, m).
-        origin: Minimum-norm tensions that balance the wrench without regard to the limits [N], shape (m,).
-        scale: Factor of each cable in the equation `tension variable = scale * chord tension + offset`, shape (m,). It
-            is 1 for the chord tension and cos phi for the horizontal tension. For the frame-end tension it is the
-            derivative with respect to the chord tension.
+        origin: Minimum-norm tensions that balance the wrench [N], shape (m,); they may violate the limits.
+        scale: Factor of each cable in the equation `tension variable = scale * chord tension + offset`, shape (m,): 1
+            for the chord tension, cos phi for the horizontal tension, and the derivative by chord tension for the
+            frame-end tension.
         offset: Offset in this equation [N], shape (m,); zero except for the frame-end tension.
     """
 
@@ -62,7 +61,7 @@ class TensionPolygon(Result, Tabular):
     offset: Array
 
     def coordinates(self, chord_tension: ArrayLike) -> Array:
-        """Coordinates of given tensions in the polygon.
+        """Compute the coordinates of tensions in the plane of the polygon.
 
         Args:
             chord_tension: Chord tensions that balance the pose [N], shape (..., m), as in `Plan.chord_tension`.
@@ -71,7 +70,7 @@ class TensionPolygon(Result, Tabular):
             Coordinates in the null space [N], shape (..., r); NaN where the tensions are NaN.
 
         Raises:
-            InvalidValueError: If the tensions are not numbers, or not one number per cable.
+            InvalidValueError: If `chord_tension` does not contain numbers, or not one number per cable.
         """
         given = checked(chord_tension, "chord_tension", "N", missing=True)
         if given.ndim == 0 or given.shape[-1] != self.scale.size:

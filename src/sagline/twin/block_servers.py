@@ -1,4 +1,4 @@
-"""Servers of the data blocks of a twin, one server per group: base class for all protocols."""
+"""Servers of the data blocks of a twin, one server per group: the base class for all protocols."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class BlockServers(ABC):
             raise
 
     def publish(self, blocks: Sequence[bytes | None]) -> None:
-        """Replace DB101 of each group in one step. None leaves the block of a group unchanged."""
+        """Replace DB101 of each group in one step. The block of a group with None does not change."""
         for group, block in enumerate(blocks):
             if block is not None:
                 with self._locked(group, FROM_PLC):
@@ -57,7 +57,7 @@ class BlockServers(ABC):
 
     @abstractmethod
     def _listen(self, group: int, host: str, port: int) -> int:
-        """Start the server of a group; return its port."""
+        """Start the server of a group. Returns the port of the server."""
 
     @abstractmethod
     def _locked(self, group: int, block: Block) -> AbstractContextManager[object]:
@@ -65,12 +65,12 @@ class BlockServers(ABC):
 
 
 def _check_free(host: str, port: int) -> str:
-    """Address with a free port. It is checked here, because python-snap7 lets two twins use the same port."""
+    """Address whose port is free. This check is needed, because python-snap7 lets two twins use the same port."""
     try:
         number = host.strip("[]") if ":" in host else socket.gethostbyname(host)
         with socket.create_server((number, port), family=socket.AF_INET6 if ":" in number else socket.AF_INET):
             return number
-    except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two exceptions occur for invalid names
+    except (OSError, OverflowError, ValueError, TypeError) as error:  # an invalid name causes the last two exceptions
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValueError(
             "address of the twin",

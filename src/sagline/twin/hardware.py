@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from sagline.control.link import HEARTBEAT
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.simulation.simulate import frequency_with_winches, platform_frequency
+from sagline.dynamics.simulation.simulate import highest_frequency
 from sagline.dynamics.simulation.simulator import Reading, Simulator
 from sagline.dynamics.simulation.winches import drive_data
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
@@ -27,10 +27,10 @@ from sagline.twin.plc_program import LEFT, PlcLimits
 
 
 class _EncoderScale:
-    """Conversion between lengths and encoder counts. Known drums: by their turns. Otherwise: with a constant radius."""
+    """Conversion between lengths and encoder counts: by the turns of known drums, otherwise with a constant radius."""
 
     def __init__(self, robot: Robot, length: Array, counts: Array) -> None:
-        """Reference lengths [m] (m,) and counts (m,) of a robot's encoders."""
+        """Store lengths [m], (m,), and the encoder counts, (m,), at these lengths, as a reference."""
         winch = robot.winches
         if winch is None or winch.counts_per_turn is None:
             step = "Give counts_per_turn in the robot file, or with robot.replace(winches=Winch(counts_per_turn=...))."
@@ -73,19 +73,13 @@ class _EncoderScale:
 
 SHARE: Final = 0.2  # largest phase of the highest mode in a step [rad]
 NEAR: Final = 1e-6  # largest deviation from a whole number of steps, in periods
-REACH: Final = 2.0  # cable length if cable_length is unknown, divided by the largest distance of two frame anchors
+REACH: Final = 2.0  # default of cable_length, divided by the largest distance of two frame anchors
 
 
-class Start(NamedTuple):
-    """State of a machine before it is switched on."""
-
-    state: Equilibrium  # equilibrium of the true robot
-    nominal: _EncoderScale  # conversion of the encoders in the PLCs
-    true: _EncoderScale  # conversion of the encoders by the true drums
-
-
-def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
-    """Compute the true equilibrium at the start and the conversions of the encoders."""
+def _initial_state(
+    true: Robot, nominal: Robot, start: Any, surveyed: bool
+) -> tuple[Equilibrium, _EncoderScale, _EncoderScale]:
+    """True equilibrium at the start, and the conversions between lengths and counts: in the PLCs, by the true drums."""
     pose = _start_pose(nominal, start)
     plan = inverse(nominal, pose)
     planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
@@ -101,7 +95,7 @@ def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> St
     else:
         routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # without wrapped and dead lengths
         state = _rest_at(true, planned + routed + _zero_errors(true, nominal), pose)
-    return Start(state, scale, _EncoderScale(true, state.unstrained_length, counts))
+    return state, scale, _EncoderScale(true, state.unstrained_length, counts)
 
 
 def _start_pose(robot: Robot, start: Any) -> Pose:
@@ -115,8 +109,8 @@ def _start_pose(robot: Robot, start: Any) -> Pose:
     return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
 
 
-def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
-    """Limits of a robot's winches in the PLCs; each limit is a list over all winches."""
+def _winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
+    """Limits of a robot's winches in the PLCs. Each limit is a list with one number per winch."""
     winch, anchors = robot.winches, robot.frame_anchors
     assert winch is not None
     apart = np.linalg.norm(anchors[:, None] - anchors, axis=-1).max()
@@ -129,8 +123,8 @@ def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
     return PlcLimits(*(column.tolist() for column in (dead + LEFT, most, speed, tension)))
 
 
-def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
-    """Refuse a `step` [s] that is too long for the robot's modes, and a `period` [s] out of range.
+def _check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
+    """Refuse a `step` [s] that is too long for the robot's modes. Refuse a `period` [s] out of range.
 
     The period must be a whole multiple of the step, and at most the heartbeat.
     """
@@ -142,8 +136,7 @@ def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> 
     length = state.unstrained_length
     pose = Pose.from_quaternion(state.pose.position[None], state.pose.quaternion[None])
     data = drive_data(robot, "robot", length, False)
-    platform = platform_frequency(robot, pose, length[None])
-    highest = frequency_with_winches(platform, d.DRUMS, data, length[None], robot.cables.axial_stiffness)
+    highest = highest_frequency(robot, pose, length[None], d.DRUMS, data)
     if step * highest > SHARE:
         limit, frequency = SHARE / highest, highest / (2.0 * math.pi)
         finer = 1e-3 / 2 ** math.ceil(math.log2(1e-3 / limit))
@@ -169,7 +162,7 @@ def _rest_at(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
 
 
 def _zero_errors(true: Robot, nominal: Robot) -> Array:
-    """Zero errors of the encoders: true minus indicated length off the drums [m], shape (m,)."""
+    """Zero errors of the encoders [m], (m,): true length off the drum minus the length from the counts."""
     error = np.zeros(true.cable_count)
     if true.winches is not None and nominal.winches is not None:
         there, thought = true.winches.length_zero, nominal.winches.length_zero
@@ -179,7 +172,7 @@ def _zero_errors(true: Robot, nominal: Robot) -> Array:
 
 
 def _routed_length(robot: Robot, pose: Pose) -> Array:
-    """Sum of the length on the pulley and the dead length of each cable [m], (m,)."""
+    """For each cable, length on the pulley plus dead length [m], (m,)."""
     if robot.winches is None or not robot.winches.anything_behind:
         return np.zeros(robot.cable_count)
     whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))
@@ -187,9 +180,9 @@ def _routed_length(robot: Robot, pose: Pose) -> Array:
 
 
 def plc_limits(robot: Robot) -> PlcLimits:
-    """Limits of a robot's winches in the PLCs; each limit is a list over all winches."""
+    """Limits of a robot's winches in the PLCs. Each limit is a list with one number per winch."""
     planned = _feasible_lengths(inverse(robot, _start_pose(robot, None)).unstrained_length, robot, "test_box")
-    return winch_limits(robot, _EncoderScale(robot, planned, np.zeros(robot.cable_count)))
+    return _winch_limits(robot, _EncoderScale(robot, planned, np.zeros(robot.cable_count)))
 
 
 FILTER: Final = 0.05  # time constant of the PLCs' filters of load cells [s]
@@ -201,13 +194,26 @@ class Hardware:
 
     Attributes:
         counts: Encoder counts, whole numbers as floats, shape (m,).
+        limits: Limits of the winches in the PLCs.
     """
 
-    def __init__(self, robot: Robot, begin: Start, damping: Damping, step: float, period: float, seed: int) -> None:
-        """Begin with brakes on; `step`: step of the plant [s]; `period`: period of the PLCs [s]."""
-        self._simulator = Simulator(robot, begin.state, winches="robot", step=step, damping=damping, seed=seed)
+    def __init__(
+        self,
+        robot: Robot,
+        nominal: Robot,
+        start: Any,
+        surveyed: bool,
+        damping: Damping,
+        step: float,
+        period: float,
+        seed: int,
+    ) -> None:
+        """Begin with brakes on. `step`: time step of the simulation [s]. `period`: period of the PLCs [s]."""
+        state, self._nominal, self._true = _initial_state(robot, nominal, start, surveyed)
+        self._simulator = Simulator(robot, state, winches="robot", step=step, damping=damping, seed=seed)
+        _check_step(robot, state, step, period)
         self._simulator.hold()
-        self._nominal, self._true, self._period = begin.nominal, begin.true, period
+        self._period, self.limits = period, _winch_limits(nominal, self._nominal)
         m, winch, reading = robot.cable_count, robot.winches, self._simulator.reading
         assert winch is not None
         self._full = np.full(m, np.inf) if winch.load_cell_range is None else winch.load_cell_range
@@ -216,7 +222,7 @@ class Hardware:
         self._wrong: dict[int, tuple[float, float]] = {}  # factor and offset [N] of the readings of faulty load cells
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
-        self._load_changed = True  # True until the simulator has the new load
+        self._load_changed = True  # True until the simulator has received the new load
         # read: readings at the end of a period, shape (5, m). The rows are LENGTH: unstrained lengths off the drums,
         # from the encoder counts and the nominal drums [m]; RATE: mean rates of the lengths over the period [m/s];
         # TORQUE: torques of the motors at their shafts, positive torque pays out cable [N m]; CELL: readings of the
@@ -266,14 +272,14 @@ class Hardware:
 
     @property
     def saturated(self) -> Array:
-        """Flags (m,) that are nonzero for drives at a limit of torque or speed."""
+        """Flags (m,), nonzero for each drive that is at its limit of torque or speed."""
         return self._simulator.reading.saturated
 
     def spoil_cell(self, cell: int, words: str | None, value: float) -> None:
-        """Give a load cell one of the faults of `KINDS`, or remove its fault."""
+        """Begin a fault of a load cell, one of `KINDS`, or remove the fault."""
         if words is None:
             self._wrong.pop(cell, None)
-            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # the filter starts again
+            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # the filter restarts from the next reading
         elif words == "is wrong by #":
             self._wrong[cell] = (1.0, value)
         else:
@@ -285,7 +291,7 @@ class Hardware:
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Shift the count of an encoder by `length` of cable [m]. The drive then moves the cable by this length."""
+        """Shift an encoder by the counts of `length` [m] of cable. The drive then moves the cable by this length."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
         self._simulator.shift(-slip / self._true.per_meter[winch], winch)

@@ -1,4 +1,4 @@
-"""Faults that are injected into a machine; each can be written as one line of text."""
+"""Faults that are injected into a machine. Each fault can be written as one line of text."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class _FaultKind(NamedTuple):
     """One kind of fault."""
 
     item: str  # kind of part ("cell")
-    words: str  # text of the fault, with # in place of its value
+    words: str  # text of the fault, with # at the place of the value
     sense: str  # meaning as text
     unit: str = ""  # unit of the value, in texts
-    scale: float = 1.0  # factor from the unit of the value to SI
+    scale: float = 1.0  # factor that converts the value to SI
     for_good: bool = False  # True if the fault ends only by a reset
 
     @property
     def numbered(self) -> bool:
-        """True if a machine has several, numbered parts of this kind."""
+        """True if a machine has several parts of this kind, which are numbered."""
         return self.item in ("cell", "cable", "encoder", "servo", "group")
 
 
@@ -104,7 +104,7 @@ def fault(text: str) -> Injected:
         The fault.
 
     Raises:
-        InvalidValueError: If the fault does not exist; the message lists the known words.
+        InvalidValueError: If the fault does not exist: the message lists the known words.
 
     Examples:
         >>> import sagline as sl
@@ -116,7 +116,7 @@ def fault(text: str) -> Injected:
         raise InvalidValueError("fault", brief(given), "a text", 'Write the fault as "cell 3 sticks at 40 s".')
     words = " ".join(given.lower().split())
     tail = _TAIL.search(words)
-    assert tail is not None  # the match may be empty
+    assert tail is not None  # the text before the time may be empty
     what = words[: tail.start()]
     time, duration = _seconds(text, tail["time"], 0.0), _seconds(text, tail["duration"], math.inf)
     if not duration > 0.0:
@@ -134,7 +134,7 @@ def fault(text: str) -> Injected:
 
 
 def _unknown(text: str, what: str) -> InvalidValueError:
-    """Create the error for unknown words; it lists the known faults of the part, or the known parts."""
+    """Create the error for unknown words. The error lists the known faults of the part, or the known parts."""
     items = sorted({kind.item for kind in KINDS.values()})
     first = what.split(" ")[0] if what else ""
     item = next((item for item in items if item.split(" ")[0] == first), None)
@@ -173,7 +173,7 @@ def _number(text: str, word: str | None, otherwise: float, unit: str) -> float:
 
 
 class TimedQueue:
-    """Queue of items with their times; items of equal time remain in the order in which they were added."""
+    """Queue of items, sorted by their times. Items with equal times keep the order in which they were added."""
 
     def __init__(self) -> None:
         """Make an empty queue."""
@@ -186,12 +186,12 @@ class TimedQueue:
         return bool(self._items)
 
     def add(self, time: float, item: Any) -> None:
-        """Add an item; `time`: time from which it is due [s]."""
+        """Add an item. `time`: time from which it is due [s]."""
         self._added += 1
         heappush(self._items, (time, self._added, item))
 
     def due(self, now: float) -> list[tuple[float, Any]]:
-        """Remove the items that are due up to the time `now` [s], each with its time, the earliest first."""
+        """Remove all items that are due until `now` [s]. Returns the items with their times, in the order of time."""
         found = []
         while self._items and self._items[0][0] <= now + TINY:
             time, _, item = heappop(self._items)

@@ -1,4 +1,4 @@
-"""Link in the process of the machine and in lockstep with it, with delay, jitter and losses of messages."""
+"""Link in the process of the machine, in lockstep with the machine, with delay, jitter and losses of messages."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Network:
         self._generator = np.random.default_rng((seed, 1))
 
     def send(self, way: TimedQueue, now: float, message: Any) -> None:
-        """Add a message that is sent now [s] to a queue with its arrival time, unless the message is lost."""
+        """Add a message to the queue `way` with its arrival time, or lose it. `now`: time of sending [s]."""
         lost, late = (1.0, 0.0) if self.ideal else self._generator.random(2)
         if lost >= self._loss:
             way.add(now + self._delay + late * self._jitter, message)
 
 
-FIRST: Final = 2  # index of the first array of `PlcBlocks` with one column per group, not per winch
+FIRST: Final = 2  # index of the first array of `PlcBlocks` with one column per group; before it, per winch
 
 COUNTS, STATE, DRIVE_FAULT = range(3)  # rows of the second array
 COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third array
@@ -67,11 +67,11 @@ class PlcBlocks:
 
 
 class Report(NamedTuple):
-    """Content of the block of one group, in the form that a server needs.
+    """Content of the block of one group, as servers need it.
 
     Attributes:
         counter: Block counter, at the beginning of the block.
-        counter_again: Block counter at the end of the block; it differs from `counter` in an incomplete block.
+        counter_again: Block counter at the end of the block. The counters of an incomplete block differ.
         foreign: True if the block belongs to another program.
         plc_time: Clock of the PLC [s].
         owner: Id of the controller that owns the group, 0 for none.
@@ -106,15 +106,15 @@ class Report(NamedTuple):
     winch_fault: list[int]
 
 
-INVALID: Final = {  # reasons to discard the blocks of two of the injected faults
+INVALID: Final = {  # reasons to discard the blocks that two of the injected faults produce
     "is torn": Refusal("it is incomplete, because its two counters differ", TORN),
     "is foreign": Refusal("it is of another program", f"Check the address. {LOAD}"),
 }
-HISTORY: Final = 100  # number of earlier blocks that the fault "goes back" needs
+HISTORY: Final = 100  # number of earlier blocks that are kept for the fault "goes back"
 
 
 class _Driven(Protocol):
-    """Interface of a machine, as far as a link needs it."""
+    """The part of a machine's interface that a link uses."""
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -139,11 +139,11 @@ class MachineLink:
     """`Link` to a machine in the same process, without a thread."""
 
     def __init__(self, machine: _Driven, network: Network, moves: bool) -> None:
-        """Begin without data of any group. Callers create the link with `Machine.link`."""
+        """Begin without data of any group. Use `Machine.link` to create a link."""
         self._machine, self._network, self._moves = machine, network, moves
         self._groups = machine.groups
         count = len(self._groups)
-        self._outbound = [TimedQueue() for _ in range(count)]  # messages that have been sent, but have not arrived
+        self._outbound = [TimedQueue() for _ in range(count)]  # messages that were sent but have not arrived yet
         self._inbound = [TimedQueue() for _ in range(count)]
         self._newest: list[PlcBlocks | None] = [None] * count
         self._arrival = np.zeros(count)
@@ -198,14 +198,14 @@ class MachineLink:
                 self._network.send(self._outbound[group], now, message)
 
     def before(self, now: float) -> None:
-        """Deliver the messages that have arrived by `now`, the time of the beginning of a scan [s]."""
+        """Deliver the messages that have arrived until `now`, the start time of a scan [s]."""
         if not self._network.ideal:
             for group, way in enumerate(self._outbound):
                 for _, message in way.due(now):
                     self._machine.deliver(group, message)
 
     def after(self, now: float, snapshot: PlcBlocks, spoiled: dict[int, str]) -> None:
-        """Send the blocks of the PLCs after a scan; `now`: time [s]."""
+        """Send the blocks of the PLCs after a scan. `now`: time [s]."""
         if self._network.ideal and not spoiled:
             self._newest, self._owner = [snapshot] * len(self._groups), list(snapshot.owners)
             self._arrival.fill(now)
@@ -218,7 +218,7 @@ class MachineLink:
         self._past.append(snapshot)
 
     def _blocks(self, group: int, snapshot: PlcBlocks, how: str | None) -> list[PlcBlocks | Refusal]:
-        """Blocks that a group sends in a scan, and the reason if one of them is invalid."""
+        """Blocks that a group sends in a scan, and the reason to discard them if a block is invalid."""
         held, self._held[group] = self._held[group], None
         if how == "goes back":
             self._steps_back[group] += 1
@@ -270,7 +270,7 @@ class MachineLink:
         )  # fmt: skip
 
     def _mixed(self, newest: list[PlcBlocks]) -> tuple[Any, ...]:
-        """Arrays with the newest block of each group."""
+        """Arrays that contain the newest block of each group."""
         found = tuple(array.copy() for array in newest[0].arrays)
         for group, (part, block) in enumerate(zip(self._parts, newest, strict=True)):
             for k, (array, own) in enumerate(zip(found, block.arrays, strict=True)):

@@ -15,25 +15,12 @@ from sagline.dynamics.simulation.simulator import Reading
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.twin.hardware import CELL, LENGTH, Hardware, check_step, initial_state, winch_limits
+from sagline.twin import link as plc_link
+from sagline.twin.hardware import CELL, LENGTH, Hardware
 from sagline.twin.injected import KINDS, Injected, TimedQueue, fault
-from sagline.twin.link import (
-    COUNTER,
-    COUNTS,
-    DRIVE_FAULT,
-    ECHO,
-    FAULT,
-    OWNER,
-    STATE,
-    STATUS,
-    MachineLink,
-    Network,
-    PlcBlocks,
-    Report,
-)
 from sagline.twin.plc_program import Order, PlcLimits, Program
 
-LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed; about 2 N s/m of air damping on the prototype
+LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed; the prototype has about 2 N s/m of air damping
 MOST_SEED: Final = 2**63 - 1
 LARGEST_ID: Final = 2**32 - 1
 RIVAL: Final = 2**31 - 2  # id of the controller that owns a group because of an injected fault
@@ -41,20 +28,20 @@ TRIPPED: Final = 1  # fault code of a tripped drive
 
 
 class Machine:
-    """Simulated machine in steps of one period, for a controller in this process or for a server.
+    """Machine that is simulated in steps of one period, for a controller in this process or for a server.
 
     A controller in the same process uses `link`. Each exchange advances the machine by a period. A server for
-    controllers in other processes makes these calls in every period:
+    controllers in other processes makes the following calls in every period:
 
         machine.claim(group, owner)      # if a claim was written
         machine.take(group, command)     # command in the group's block, for its own winches only
         machine.advance()
         machine.report(group)            # present block of the group; None: leave the block unchanged
 
-    At the beginning of a period, each PLC runs its program and converts set points to counts, with the data of the
+    At the beginning of a period, each PLC runs its program, and converts set points to counts with the data of the
     nominal drums. The drives then move linearly until the end of the period. The true drums convert counts to cable
-    length. The inner control loops use the exact drum angles every millisecond; only the readings are rounded to the
-    resolution of the encoders (nanometers).
+    length. The inner control loops use the exact drum angles every millisecond. Only the readings are rounded to whole
+    counts; a count is some nanometers of cable.
 
     Attributes:
         robot: The true robot.
@@ -84,8 +71,8 @@ class Machine:
         Args:
             robot: The true robot, with all data of its winches and encoders.
             nominal: The robot used for planning; the PLCs use its data for counts and limits. None: the true robot. The
-                zero error of an encoder is the difference between the `length_zero` of both robots, or zero if a value
-                is missing.
+                zero error of an encoder is the difference of `length_zero` between both robots, or zero if a value is
+                missing.
             start: Pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
                 platform is at the equilibrium for the free lengths that the nominal robot has at this pose.
             surveyed: True if the true platform was exactly at the pose `start` when the encoders were set.
@@ -99,8 +86,8 @@ class Machine:
             faults: One or several faults, each as a text (see `fault`) or as a result of `fault`.
 
         Raises:
-            InvalidValueError: If data are missing, the step is too long for the robot's modes, the robot has no
-                equilibrium near the start, or an argument has the wrong type.
+            InvalidValueError: If data are missing. If `step` is too long for the robot's modes. If the robot has no
+                equilibrium near `start`. If an argument has the wrong type.
 
         Examples:
             >>> import sagline as sl
@@ -118,24 +105,24 @@ class Machine:
         size = number(step, "step", "s", above=0.0)
         losses = optional(damping, Damping, "damping") or LOSSES
         noise = whole_number(seed, "seed", 0, MOST_SEED)
-        self._network = Network(delay, jitter, loss, noise)
-        begin = initial_state(robot, self.nominal, start, flag(surveyed, "surveyed"))
-        self._hardware = Hardware(robot, begin, losses, size, self.period, noise)
-        check_step(robot, begin.state, size, self.period)
+        self._network = plc_link.Network(delay, jitter, loss, noise)
+        known = flag(surveyed, "surveyed")
+        self._hardware = Hardware(robot, self.nominal, start, known, losses, size, self.period, noise)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self.groups]
-        self._programs = self._make_programs(winch_limits(self.nominal, begin.nominal))
+        self._programs = self._make_programs(self._hardware.limits)
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
         self._group_rows = np.zeros((5, len(self.groups)), dtype=np.int64)
         self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)
-        self._reported: Any = None  # last reported blocks, without counters
+        self._reported: Any = None  # last blocks that were reported, without their counters
         self._cycles = self._counter = 0
-        self._links: list[MachineLink] = []
+        self._links: list[plc_link.MachineLink] = []
         self._schedule, self._commands = TimedQueue(), ""  # starts (True) and ends of faults; fault of all commands
         self._spoiled: dict[int, str] = {}
         self._stopped: set[int] = set()
         self._taken: set[int] = set()
         self._snapshot = self._written(None)
-        for one in _each_fault(faults):
+        step_to = 'Give texts: faults=["cell 3 sticks at 40 s"].'
+        for one in elements(faults, str | Injected, "faults", step_to):
             self.inject(one)
 
     def _make_programs(self, limits: PlcLimits) -> list[Program]:
@@ -157,17 +144,17 @@ class Machine:
         """True state of the plant. Every period overwrites it."""
         return self._hardware.reading
 
-    def link(self, *, moves: bool = True) -> MachineLink:
+    def link(self, *, moves: bool = True) -> plc_link.MachineLink:
         """Link to the machine for a controller in this process.
 
         Args:
-            moves: True if each exchange of the link advances the machine by a period. If there are several links, use
-                True for only one of them.
+            moves: True if each exchange of the link advances the machine by a period. Only one of several links may
+                have True.
 
         Returns:
             The link: a `sagline.control.link.Link`.
         """
-        link = MachineLink(self, self._network, flag(moves, "moves"))
+        link = plc_link.MachineLink(self, self._network, flag(moves, "moves"))
         self._links.append(link)
         return link
 
@@ -179,7 +166,7 @@ class Machine:
             owner: Id of the controller; 0 for none.
 
         Raises:
-            InvalidValueError: If the group does not exist, or the id is not a whole number of 32 bits.
+            InvalidValueError: If the group does not exist. If the id is not a whole number of 32 bits.
         """
         self.deliver(self._group(group), whole_number(owner, "owner", 0, LARGEST_ID))
 
@@ -191,7 +178,7 @@ class Machine:
             command: Command with arrays for the winches of the group only.
 
         Raises:
-            InvalidValueError: If the group does not exist, or the command is of another type or for other winches.
+            InvalidValueError: If the group does not exist. If `command` is not a command for the winches of this group.
         """
         chosen = self._group(group)
         count = len(self.groups[chosen])
@@ -224,7 +211,7 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Simulate one period: due faults, scans of the PLCs, motion of drives and plant, and readings at the end."""
+        """Simulate one period: faults that are due, scans of the PLCs, motion of drives and plant, and new readings."""
         now = self.time
         if self._schedule.waiting:
             self._apply_due_faults()
@@ -253,34 +240,36 @@ class Machine:
             powered += program.powered
         hardware.simulate_period(length, tension, powered)
 
-    def _written(self, before: PlcBlocks | None) -> PlcBlocks:
-        """Blocks of all groups. The block of a stopped PLC does not change."""
+    def _written(self, before: plc_link.PlcBlocks | None) -> plc_link.PlcBlocks:
+        """Blocks of all groups. A stopped PLC keeps its previous block."""
         hardware, programs, groups = self._hardware, self._programs, self._group_rows
         self._counter = self._counter % COUNTERS + 1
-        groups[COUNTER] = self._counter
-        groups[ECHO] = [program.echo for program in programs]
+        groups[plc_link.COUNTER] = self._counter
+        groups[plc_link.ECHO] = [program.echo for program in programs]
         saturated = hardware.saturated.tolist()
         news = [(program.owner, program.status, program.fault, *program.powered) for program in programs], saturated
         if news != self._reported:
             self._reported = news
-            groups[OWNER], groups[STATUS], groups[FAULT] = zip(*(row[:3] for row in news[0]), strict=True)
+            owners, status, faults = zip(*(row[:3] for row in news[0]), strict=True)
+            groups[plc_link.OWNER], groups[plc_link.STATUS], groups[plc_link.FAULT] = owners, status, faults
             for program, part in zip(programs, self._parts, strict=True):
-                self._whole[STATE, part], self._whole[DRIVE_FAULT, part] = program.states(saturated[part])
-        self._whole[COUNTS] = hardware.counts
-        new = PlcBlocks((hardware.read.copy(), self._whole.copy(), groups.copy(), self._clocks + self.time))
+                states = program.states(saturated[part])
+                self._whole[plc_link.STATE, part], self._whole[plc_link.DRIVE_FAULT, part] = states
+        self._whole[plc_link.COUNTS] = hardware.counts
+        new = plc_link.PlcBlocks((hardware.read.copy(), self._whole.copy(), groups.copy(), self._clocks + self.time))
         if before is not None and self._stopped:
             for group in self._stopped:
                 new.keep(group, self._parts[group], before)
         return new
 
-    def report(self, group: int) -> Report | None:
+    def report(self, group: int) -> plc_link.Report | None:
         """Present block of a group.
 
         Args:
             group: Index of the group, from 0.
 
         Returns:
-            The block; None if a fault keeps the previous block.
+            The block. None if the previous block remains because of a fault.
 
         Raises:
             InvalidValueError: If the group does not exist.
@@ -294,7 +283,7 @@ class Machine:
         counter, *state = groups[:, group].tolist()
         again = counter % COUNTERS + 1 if how == "is torn" else counter
         rows: list[Any] = [*floats[:, part].tolist(), *whole[:, part].tolist()]
-        return Report(counter, again, how == "is foreign", float(clock[group]), *state, *rows)
+        return plc_link.Report(counter, again, how == "is foreign", float(clock[group]), *state, *rows)
 
     def inject(self, what: str | Injected) -> None:
         """Inject a fault.
@@ -303,7 +292,7 @@ class Machine:
             what: Text of a fault, or a result of `fault`. A fault with a time in the past begins immediately.
 
         Raises:
-            InvalidValueError: If the fault does not exist, or the machine has no such part.
+            InvalidValueError: If the fault does not exist. If the machine has no such part.
         """
         found = what if isinstance(what, Injected) else fault(what)
         kind = KINDS[choice(found.kind, "fault: kind", KINDS)]
@@ -357,7 +346,7 @@ class Machine:
     def emergency_stop(self) -> None:
         """Press the emergency stop.
 
-        Hardware locks the drums and cuts the power; the PLCs only report the stop. They read a normally closed contact.
+        Hardware locks the drums and cuts the power. The PLCs only report the stop, from a normally closed contact.
         A broken wire therefore has the same effect as the stop.
         """
         for program in self._programs:
@@ -368,8 +357,3 @@ class Machine:
         for program in self._programs:
             program.contact = True
             program.reset()
-
-
-def _each_fault(faults: Any) -> Iterable[Any]:
-    """Convert one or several faults to an iterable."""
-    return elements(faults, str | Injected, "faults", 'Give texts: faults=["cell 3 sticks at 40 s"].')

@@ -1,4 +1,4 @@
-"""Modbus servers of a twin in one thread. Their data blocks are the same as those of the S7 servers."""
+"""Modbus servers of a twin in one thread, with the same data blocks as the S7 servers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class ModbusServers(BlockServers):
     """Data blocks of all PLCs in holding registers."""
 
     def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
-        """Start the thread and the servers. The arguments are those of `BlockServers`."""
+        """Start the thread and the servers. The arguments are the same as in `BlockServers`."""
         self._locks = [Lock() for _ in blocks]
         self._servers: list[ModbusTcpServer] = []
         self._loop = asyncio.new_event_loop()

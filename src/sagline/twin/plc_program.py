@@ -34,7 +34,7 @@ _LEAVE, _HOLD, _FOLLOW, _LOCK = (int(mode) for mode in (Mode.LEAVE, Mode.HOLD, M
 
 
 class Order(NamedTuple):
-    """Command to one PLC, for its own winches only."""
+    """Command to one PLC: values for the winches of its group."""
 
     counter: int
     owner: int
@@ -62,14 +62,14 @@ class Program:
     """
 
     def __init__(self, limits: PlcLimits, period: float) -> None:
-        """Begin with brakes on and without an owner; `period`: period of a scan [s]."""
+        """Begin with brakes on and without an owner. `period`: period of a scan [s]."""
         self.limits, self.period = limits, period
         count = len(limits.least)
         self.winches = range(count)
         # owner: id of the controller that owns the group, 0 for none
-        # echo: counter of the last accepted command, 0 before the first
-        # fault: reason of an automatic stop. A command to hold acknowledges the fault, if the ramp has ended and at
-        # least 100 ms have passed.
+        # echo: counter of the last accepted command, 0 before the first command
+        # fault: reason of an automatic stop. A command to hold clears it after the end of the ramp, at the earliest
+        # after 100 ms.
         self.owner, self.echo, self.fault = 0, 0, GroupFault.NONE
         self.powered = [False] * count  # True for each drive that has power and a released brake
         self._loaded = [False] * count  # True for each drive that produces the expected tension
@@ -79,7 +79,7 @@ class Program:
         self.drive_fault = [0] * count  # fault codes of the drives, 0 for none
         # contact: state of the normally closed contact of the emergency stop: False if the stop is pressed, or if the
         # wire is broken
-        # emergency: True from the opening of the contact until a reset with a closed contact
+        # emergency: True after the contact has opened, until a reset with a closed contact
         # locked: True if the drums are locked until the operator releases them
         self.contact, self.emergency, self.locked = True, False, False
         self._order: Order | None = None
@@ -93,7 +93,7 @@ class Program:
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
-        """Set an owner if there is none, or if the owner's counter is unchanged for OWNER_TIMEOUT; `now`: time [s]."""
+        """Set an owner if none exists or the owner's counter has not changed for OWNER_TIMEOUT. `now`: time [s]."""
         if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
             self.seize(owner, now)
 
@@ -105,7 +105,7 @@ class Program:
             self._stop(GroupFault.HEARTBEAT)
 
     def take(self, order: Order) -> None:
-        """Accept the command `order` if it is from the owner, and newer than the last command."""
+        """Accept the command `order` if the owner sent it and it is newer than the last command."""
         if self.owner and order.owner == self.owner and (not self.echo or newer(order.counter, self.echo)):
             self.echo, self._order, self._fresh = order.counter, order, True
 
@@ -123,12 +123,12 @@ class Program:
         self._brake()
 
     def trip(self, winch: int, code: int) -> None:
-        """Trip a drive. It has no power until the operator resets it."""
+        """Trip a drive, which then has no power until the operator resets it."""
         self.drive_fault[winch], self.powered[winch] = code, False
         self._stop(GroupFault.DRIVE)
 
     def scan(self, now: float, encoder: list[float], cell: list[float]) -> None:
-        """Set the drives for the next period; `now`: time [s]; `encoder` [m]; `cell` [N]."""
+        """Set the drives for the next period. `now`: time [s]. `encoder`: lengths [m]. `cell`: tensions [N]."""
         order, fresh, waited, self._now = self._order, self._fresh, now - self._moved, now
         self.emergency = self.emergency or not self.contact
         if fresh and order is not None:
@@ -148,20 +148,20 @@ class Program:
             self._brake()
             return
         if self._lags(encoder):
-            if self.fault == GroupFault.FOLLOWING_ERROR:  # the set points are the drives' positions
+            if self.fault == GroupFault.FOLLOWING_ERROR:  # without power, set points are the positions of the drives
                 self.locked = True
                 self._brake()
                 return
             self._move_to_drives(encoder, cell)
             self._stop(GroupFault.FOLLOWING_ERROR)
-            self.fault = GroupFault.FOLLOWING_ERROR  # replaces an earlier fault
+            self.fault = GroupFault.FOLLOWING_ERROR  # this fault replaces an earlier fault
         if any(self.drive_fault):
             self.fault = self.fault or GroupFault.DRIVE
         elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_reported)):
             self.fault = GroupFault.NONE
             if order.enable != self.powered:
                 self._switch(order, encoder)
-                waited = 0.0  # a drive starts without a distance from its set point
+                waited = 0.0  # a drive starts at its set point
             self._obey(order, waited, cell)
             return
         elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:
@@ -182,7 +182,7 @@ class Program:
         return True
 
     def _move_to_drives(self, encoder: list[float], cell: list[float]) -> None:
-        """Replace each set point that is too far from its drive. The drive's position and cell tension are used."""
+        """Replace each set point that is too far from its drive, by position of the drive and tension of the cell."""
         read = self._valid_tensions([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:
@@ -190,7 +190,7 @@ class Program:
                 self.length[i], self._rate[i], self.tension[i] = encoder[i], 0.0, read[i]
 
     def _brake(self) -> None:
-        """Cut the power of all drives; their brakes engage."""
+        """Cut the power of all drives, so that their brakes engage."""
         self.powered = [False] * len(self.powered)
         self._loaded = list(self.powered)
         self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, _LEAVE
@@ -198,7 +198,7 @@ class Program:
     def _switch(self, order: Order, encoder: list[float]) -> None:
         """Switch on the enabled drives at their present lengths, and switch off all others.
 
-        A drive first produces the expected tension; its brake is released with the next command.
+        A drive first produces the expected tension. The next command releases its brake.
         """
         self.length, self._target, self._rate = list(self.length), list(self._target), list(self._rate)
         for i in self.winches:
@@ -223,16 +223,16 @@ class Program:
         self._slow_down(cell)
 
     def _valid_tensions(self, tension: list[float]) -> list[float]:
-        """Set the expected tensions. A tension outside the limits is replaced by the previous tension."""
+        """Set the expected tensions. The previous tension replaces a tension outside the limits."""
         rows = zip(tension, self.tension, self.limits.tension, strict=True)
         return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
 
     def _follow(self, order: Order, waited: float, cell: list[float]) -> None:
-        """Follow new set points whose lengths, steps, rates and tensions are within their limits."""
+        """Follow new set points if their lengths, steps, rates and tensions are within limits."""
         least, most, speed, tightest = self.limits
         lengths, rates, tensions, before = order.length, order.rate, order.tension, self._target
         self._mode, self._ramp = _FOLLOW, 0.0
-        waited = max(waited, 0.0) + PERIOD  # because the previous command may have been late
+        waited = max(waited, 0.0) + PERIOD  # the previous command may have been late
         for i in self.winches:
             length, fastest = lengths[i], speed[i]
             if self.powered[i]:
@@ -255,8 +255,8 @@ class Program:
     def _drive(self, cell: list[float]) -> None:
         """Advance the set points by a scan. A cable beyond its tension limit is not wound in.
 
-        Within one cycle, the set points move linearly to those of the last command. After the cycle, they continue at
-        the rates of the command. Lengths and rates stay within their limits.
+        Within one cycle, the set points move linearly to those of the last command. After the cycle, the set points
+        continue at the rates of the command. Lengths and rates stay within their limits.
         """
         limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []
@@ -271,7 +271,7 @@ class Program:
                 else:
                     at = target[i] + rate[i] * beyond
                 at = self._within_limits(i, at)
-                if not cell[i] <= limit[i] and at < length[i]:  # True for NaN
+                if not cell[i] <= limit[i] and at < length[i]:  # the condition is True for NaN
                     self._stop(GroupFault.OVER_TENSION)
                     self._slow_down(cell)
                     return
@@ -279,7 +279,7 @@ class Program:
         self.length, self._left = moved, max(left - period, 0.0)
 
     def _within_limits(self, i: int, length: float) -> float:
-        """Next set point of a winch, with a limited rate. A set point out of range may only move toward the range."""
+        """Next set point of a winch, with a limited rate. Out of range, a set point may move only toward the range."""
         at, farthest = self.length[i], self.limits.speed[i] * self.period + TINY
         if length > at + farthest:
             length = at + farthest
@@ -313,7 +313,7 @@ class Program:
 
     @property
     def _was_reported(self) -> bool:
-        """True if the ramp has ended and the fault has been reported during the heartbeat time."""
+        """True if the ramp has ended and the fault has been reported for at least the heartbeat time."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 
     @property

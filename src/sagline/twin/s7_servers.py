@@ -18,7 +18,7 @@ from sagline.twin.block_servers import LOOPBACK, BlockServers
 
 
 class _S71200(Server):
-    """Server that has the PDU size of an S7-1200 and can close its connections."""
+    """S7 server that has the PDU size of an S7-1200 and can close its connections."""
 
     def __init__(self) -> None:
         """Begin without connections."""
@@ -26,7 +26,7 @@ class _S71200(Server):
         self._sockets: set[socket.socket] = set()
 
     def start(self, tcp_port: int = 102) -> int:
-        """Listen for connections. This method replaces a method of the library that supports only IPv4."""
+        """Listen for connections, in place of the library's method, which supports only IPv4."""
         if ":" not in self.host:
             return super().start(tcp_port)
         self.server_socket = socket.create_server((self.host, tcp_port), family=socket.AF_INET6)
@@ -37,7 +37,7 @@ class _S71200(Server):
 
     @staticmethod
     def _event_sender(address: Any) -> int:
-        """Sender of an event, which is not used. This method replaces one of the library that supports only IPv4."""
+        """Name of an event's sender (unused), in place of the library's method, which supports only IPv4."""
         return 0
 
     def disconnect_all(self) -> None:
@@ -63,7 +63,7 @@ class S7Servers(BlockServers):
     """Servers of the data blocks of all PLCs for PUT and GET."""
 
     def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
-        """Start the servers. The arguments are those of `BlockServers`."""
+        """Start the servers. The arguments are the same as in `BlockServers`."""
         self._servers: list[_S71200] = []
         super().__init__(blocks, host, port)
 

@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -28,11 +28,11 @@ from sagline.twin.machine import Machine
 if TYPE_CHECKING:
     from sagline.dynamics.simulation.simulator import Reading
 
-SCAN: Final = 0.005  # scan period of a twin's PLCs [s]: half a control cycle, so that each cycle reads a new block
+SCAN: Final = 0.005  # scan period of a twin's PLCs [s]; with half a control cycle, each cycle reads a new block
 SILENT: Final = bytes(FROM_PLC.size)
 HALF: Final = 2**31
 MODES: Final = frozenset(Mode)
-ROWS: Final = (*OF_WINCHES[:-1], "fault")  # names in the block of a PLC
+ROWS: Final = (*OF_WINCHES[:-1], "fault")  # names of the values in the block of a PLC
 
 
 class Server:
@@ -58,11 +58,11 @@ class Server:
         Args:
             machine: Machine of the PLCs; its period is the scan period of the PLCs.
             host: Address of this computer for the servers; by default other computers cannot connect.
-            port: Port of the first group. The other groups have the following ports. 0: any free ports.
+            port: Port of the first group. Group k has the port `port` + k. 0: any free ports.
             modbus: True if the servers use Modbus TCP instead of S7.
 
         Raises:
-            InvalidValueError: If a port is in use or above 65535, or the address is not one of this computer.
+            InvalidValueError: If a port is in use or above 65535. If this computer does not have the address `host`.
             FileError: If the package for the protocol is not installed.
         """
         self.machine = instance(machine, Machine, "machine")
@@ -84,8 +84,8 @@ class Server:
         """Serve until interrupted.
 
         Args:
-            watch: Function that is called after every scan with the machine's time [s] and its true state. The next
-                scan overwrites this state.
+            watch: Function that is called after every scan. The arguments are the machine's time [s] and true state;
+                the next scan overwrites this state.
         """
         while True:
             self._pace.wait()
@@ -99,7 +99,7 @@ class Server:
             asked = CLAIM.read(claim)
             if not isinstance(asked, Refusal):
                 self.machine.claim(group, asked["owner"])
-            if command != self._seen[group]:  # a command that is older than the claim is ignored
+            if command != self._seen[group]:  # a command from before the claim is ignored
                 self._seen[group] = command
                 order = self._command(group, command)
                 if order is not None:
@@ -125,13 +125,13 @@ class Server:
         return Command(*head, length, rate, tension, enable != 0)
 
     def _block(self, group: int) -> bytes | None:
-        """Block of the PLC of a group; None if a fault keeps the previous block."""
+        """Block of the PLC of a group. None if the previous block remains because of a fault."""
         report = self.machine.report(group)
-        return None if report is None else block_of(group, report)
+        return None if report is None else _block_of(group, report)
 
 
 def check_first_port(port: int, robot: Robot) -> None:
-    """Refuse a first port after which there are too few ports for all groups of a robot. 0 means any free ports."""
+    """Refuse a first port that is too high for the ports of all groups of a robot. 0 means any free ports."""
     count = len(groups_of(robot.cable_count))
     last = LAST_PORT + 1 - count
     if port > last:
@@ -139,12 +139,12 @@ def check_first_port(port: int, robot: Robot) -> None:
         raise InvalidValueError("port of the first group", port, allowed, "Choose another port with --port.")
 
 
-def block_of(group: int, report: Report) -> bytes:
-    """Create the block of the report of a PLC; the group index begins at 0."""
+def _block_of(group: int, report: Report) -> bytes:
+    """Create the block that contains `report`, for the PLC of `group` (from 0)."""
     head = {"group": group + 1, "time": 1e6 * report.plc_time, "winches": len(report.length)}
     if report.foreign:
         head["magic"] = 0
-    counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # as in a PLC, counters overflow
+    counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # counters overflow as in a PLC
     columns: list[list[Any]] = [*report[8:13], counts, report.state, report.winch_fault]
     return FROM_PLC.pack(report._asdict() | head | winch_rows(ROWS, columns))
 
@@ -160,23 +160,18 @@ def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> B
         return S7Servers(blocks, host, port)
 
 
-SWITCHING_ON: Final = 60.0  # longest time for the start [s], including the loading of kernels from the disk
-
-
-class _RemoteMachine(NamedTuple):
-    """Machine in another process."""
-
-    addresses: tuple[str, ...]  # "host:port" of each group's PLC
-    place: Any  # shared memory with the true position of the platform's origin [m]
-
-    def position(self) -> Array:
-        """Position of the platform's origin after the last scan [m], shape (3,)."""
-        return np.array(self.place[:])
+SWITCHING_ON: Final = 60.0  # longest time for the start of the process [s], including the loading of kernels
 
 
 @contextmanager
-def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[_RemoteMachine]:
-    """Context with a machine in another process, in real time. At the end of the context, the process is killed."""
+def machine_in_process(
+    robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0
+) -> Iterator[tuple[tuple[str, ...], Callable[[], Array]]]:
+    """Context with a machine that runs in another process in real time. The end of the context kills the process.
+
+    The value has the address of each group's PLC, "host:port", and a function that returns the true position of the
+    platform's origin after the last scan [m], shape (3,).
+    """
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     place = context.Array("d", 3)
@@ -184,7 +179,7 @@ def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int =
     process.start()
     there.close()
     try:
-        yield _RemoteMachine(_receive_addresses(here), place)
+        yield _receive_addresses(here), lambda: np.array(place[:])
     finally:
         process.kill()
         process.join()
@@ -192,7 +187,7 @@ def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int =
 
 
 def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
-    """Wait for the addresses from the other process; raise an error that the other process reports."""
+    """Wait for the addresses from the other process. If that process reports an error, raise this error."""
     answer: tuple[str, ...] | SaglineError | None = None
     with suppress(EOFError):
         answer = pipe.recv() if pipe.poll(SWITCHING_ON) else None
@@ -205,7 +200,7 @@ def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
 
 
 def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connection, place: Any) -> None:
-    """Run the machine until killed. SIGINT is ignored, because the controller must first stop the robot."""
+    """Run the machine until the process is killed. SIGINT is ignored, because the controller must stop the robot."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         machine = Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN)

@@ -105,7 +105,7 @@ TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.3
 FIELD = 0.7  # vertical field of view [rad], narrower than viser's for less distortion
 BORDER = 1.06  # factor on the size of the box, for a margin
 _USUAL = 1.3  # ratio of width to height until a client has sent its own
-_MOVED = 1e-3  # share of the box: a camera farther than this from its set position was moved by the user
+_MOVED = 1e-3  # a camera farther than this from its set position was moved by the user, as a share of the box
 _UP: Final = np.array([0.0, 0.0, 1.0])
 
 

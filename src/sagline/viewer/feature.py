@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, TypeVar
 
 from sagline.core.arrays import Array
@@ -43,7 +44,14 @@ class Feature:
     """Base of a feature of the page: its controls, drawing, text and reactions. The base does nothing.
 
     A feature is created once, with the `Page`. The serving thread calls all its methods.
+
+    Attributes:
+        live: True if the feature follows every view of a drag that changes its key, unless the key is None, because it
+            draws at the pose. Others follow up to 20 views per second.
     """
+
+    live: bool = False
+    _task: BackgroundTask | None = None  # background task of a feature that has one
 
     @property
     def moving(self) -> bool:
@@ -53,7 +61,7 @@ class Feature:
     @property
     def waiting(self) -> bool:
         """True while a result is being computed."""
-        return False
+        return self._task is not None and self._task.busy
 
     def depends(self, view: View) -> Hashable:
         """Key of all inputs of `follow`, which is called only if the key changes; the default is a new key per view."""
@@ -110,22 +118,16 @@ class BackgroundTask:
                 begin_next()
 
         def work() -> None:
-            _lower_priority()
+            if sys.platform == "linux":  # on other systems this would affect the whole process
+                os.nice(NICENESS)
             try:
-                result = task()
+                report = partial(done, task())
             except SaglineError as error:
-                message = str(error)
-                self._later(lambda: end(lambda: failed(message)))
-                return
+                report = partial(failed, str(error))
             except BaseException as error:
-                mistake = error
-
-                def fail() -> None:
-                    raise mistake
-
-                self._later(fail)
+                self._later(partial(_raise, error))
                 return
-            self._later(lambda: end(lambda: done(result)))
+            self._later(lambda: end(report))
 
         def begin() -> None:
             self._began = time.monotonic()
@@ -137,7 +139,5 @@ class BackgroundTask:
             self._next = begin
 
 
-def _lower_priority() -> None:
-    """Lower the priority of this thread."""
-    if sys.platform == "linux":  # on other systems this would affect the whole process
-        os.nice(NICENESS)
+def _raise(error: BaseException) -> None:
+    raise error

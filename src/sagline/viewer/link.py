@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from typing import Any, Final
-from urllib.parse import parse_qsl, quote, urlencode
+from urllib.parse import parse_qsl
 from zlib import crc32
 
 import numpy as np
@@ -24,15 +24,10 @@ LONGEST: Final = 4000  # largest number of characters in a link
 LONGEST_TEXT: Final = 60  # largest number of characters in a value, and in a quotation in a message
 FARTHEST: Final = 1e12  # limit of numbers without limits of their own
 STEP: Final = "Copy the link again."
-_SAFE: Final = ",:.+"  # characters that do not require an escape in a fragment
+SAFE: Final = ",:.+"  # characters that do not require an escape in a fragment
 _NUMBERS: Final = (viser.GuiSliderHandle, viser.GuiNumberHandle)
 _VECTORS: Final = (viser.GuiVector2Handle, viser.GuiVector3Handle)
 _KINDS: Final = (*_NUMBERS, *_VECTORS, viser.GuiDropdownHandle, viser.GuiCheckboxHandle, viser.GuiTextHandle)
-
-
-def link_text(parts: dict[str, str]) -> str:
-    """Write the text of a state from its parts."""
-    return urlencode(parts, safe=_SAFE, quote_via=quote)
 
 
 def parts_of(text: str) -> dict[str, str]:

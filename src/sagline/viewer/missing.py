@@ -16,6 +16,7 @@ from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix
 from sagline.tension.methods import MinimumNorm
@@ -52,7 +53,7 @@ class MissingWrench:
 def missing_of(snapshot: Snapshot) -> MissingWrench | None:
     """Missing wrench of an infeasible pose; None for other failures, or if no wrench was found."""
     plan = snapshot.plan
-    if plan is None or snapshot.status not in _EXPLAINED:
+    if plan is None or snapshot.status not in _EXPLAINED or is_underconstrained(snapshot.robot):
         return None
     robot, state = snapshot.robot, plan.state
     missing = np.zeros(6)

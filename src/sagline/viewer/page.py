@@ -18,10 +18,9 @@ from sagline.core.errors import SaglineError
 from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.reach import check_reach
+from sagline.robot.reach import check_reach, is_underconstrained
 from sagline.robot.reach import home_pose as home_pose
 from sagline.robot.robot import Robot
-from sagline.statics.stiffness import modes
 from sagline.viewer import readout, shapes
 from sagline.viewer.camera import Framing
 from sagline.viewer.feature import Feature, View
@@ -34,7 +33,7 @@ from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, snap
 from sagline.viewer.tension_scale import TensionScale
 
 FRAME_TIME = 1.0 / 60.0  # shortest time between updates [s]
-SOON = 0.05  # longest wait for the result of a background task [s]
+SOON = 0.05  # longest wait for the result of a background task, and of the readings during a drag [s]
 IDLE = 0.5  # longest wait [s], which also is the longest delay of Ctrl-C on systems that cannot interrupt a wait
 
 F = TypeVar("F", bound=Feature)
@@ -101,11 +100,16 @@ class Page:
         found: Calibration | None = None,
         source: Source | None = None,
         beside: Beside | None = None,
+        stopping: threading.Event | None = None,
     ) -> None:
-        """Build the page. `beside` is a second run of the robot with the same clock. Other arguments: see the class."""
+        """Build the page.
+
+        `beside` is a second run of the robot with the same clock. `stopping`, when set, ends `serve`.
+        Other arguments: see the class.
+        """
         self.server, self.robot, self.wrench = server, robot, wrench
         self.mode, self.found, self.source = mode, found, source or Source()
-        self._wake, self._stopping = threading.Event(), threading.Event()
+        self._wake, self._stopping = threading.Event(), stopping or threading.Event()
         self._tasks: deque[Callable[[], None]] = deque()  # any thread may append
         self.scale, self.size = TensionScale.of(robot), shapes.size_of(robot)
         self.channel = Channel(server.gui, self.later)
@@ -126,8 +130,10 @@ class Page:
         self.features = tuple(feature for make in features if (feature := make(self)) is not None)
         self._build_gizmo()
         self._depended: dict[Feature, Hashable] = {}  # key of each feature at its last update
-        self._traced: tuple[int, int, float] = (0, 0, 0.0)  # key of the drawn traces
-        self._extended = 0  # number of extensions of the played motion
+        self._live: tuple[Feature, ...] = ()  # features that follow every view at present
+        self._drawn: View | None = None  # the view in the scene, which readings and features follow later
+        self._whole, self._followed = True, 0.0  # True after a change other than a drag; time of the last `_follow` [s]
+        self._traced: tuple[Played | None, float] = (None, 0.0)  # motion and scale of the drawn traces
         self._changed: tuple[tuple[float, float, float], Robot] | None = None  # settings, and the robot with these
 
     def serve(self) -> None:
@@ -135,27 +141,32 @@ class Page:
         self._update()
         last = time.monotonic()
         while not self._stopping.is_set():
-            self._wake.wait(timeout=self._pace)
+            pace = self._pace
+            self._wake.wait(timeout=pace)
             rest = FRAME_TIME - (time.monotonic() - last)
             if rest > 0.0:
                 time.sleep(rest)
             now = time.monotonic()
-            if self._wake.is_set() or self.player.playing or self._tasks:
+            changed = self._wake.is_set() or self.player.playing or bool(self._tasks)
+            whole = pace == FRAME_TIME or now - self._followed >= SOON
+            if changed:
                 self._wake.clear()
+                whole, self._whole = whole or self._whole, False
                 self.player.advance(now - last)
-                self._work_off()
-                self._update()
-            for feature in self.features:
-                feature.tick()
+                self._draw()
+            if whole:
+                self._follow()
+            self.updates += changed
             last = now
 
     def later(self, task: Callable[[], None]) -> None:
         """Make the serving thread call a function; any thread may call this method."""
         self._tasks.append(task)
-        self._wake.set()
+        self.refresh()
 
     def refresh(self) -> None:
         """Solve and draw the page again; any thread may call this method."""
+        self._whole = True
         self._wake.set()
 
     def extend(self, played: Played) -> None:
@@ -163,7 +174,7 @@ class Page:
 
         A clock at its end moves to the new end; a clock at an earlier time stays there.
         """
-        self.later(lambda: self._extend(played))
+        self.later(lambda: self.player.extend(played))
 
     def stop(self) -> None:
         """Make `serve` return; any thread may call this method."""
@@ -209,24 +220,19 @@ class Page:
     @property
     def _pace(self) -> float:
         """Longest wait until the next update [s]."""
+        if self._drawn is not self.view:
+            return SOON
         if self.player.playing or any(feature.moving for feature in self.features):
             return FRAME_TIME
         return SOON if any(feature.waiting for feature in self.features) else IDLE
 
-    def _work_off(self) -> None:
-        while self._tasks:
-            self._tasks.popleft()()
-
     def _put_on(self, played: Played | None) -> None:
         """Play another motion, or stop playing."""
+        self._traced = None, 0.0
         if played is None:
             self.scene.show_traces(np.empty((0, 3)), np.empty((0, 3)))
         for feature in self.features:
             feature.put_on(played)
-
-    def _extend(self, played: Played) -> None:
-        self.player.extend(played)
-        self._extended += 1
 
     def _build_gizmo(self) -> None:
         @self.scene.gizmo.on_update
@@ -236,7 +242,8 @@ class Page:
                 self.later(self.player.leave)
             elif event.phase == "end":
                 self.dragging.discard(event.client_id)
-            self.refresh()
+                self.refresh()
+            self._wake.set()
 
         self.server.on_client_disconnect(lambda client: self.dragging.discard(client.client_id))
         home = self.server.gui.add_button("Platform back home", icon=viser.Icon.HOME)
@@ -247,19 +254,37 @@ class Page:
 
     def _update(self) -> None:
         """Solve and show the present state once."""
-        player = self.player
+        self._draw()
+        self._follow()
+
+    def _draw(self) -> None:
+        """Do the tasks of other threads, then solve and draw. Readings and most features follow later."""
+        player, panel = self.player, self.panel
+        while self._tasks:
+            self._tasks.popleft()()
         try:
-            settings = self.panel.settings()
+            settings = panel.settings()
             snapshot = player.now() if player.following else self._from_gizmo(settings)
         except SaglineError as error:
-            self.panel.verdict.content = readout.refused(str(error))
+            panel.verdict.content = readout.refused(str(error))
+            self._drawn = self.view  # the verdict stays until the next drawing
             return
         played = player.played if player.following else None
-        self.panel.show_what_if("" if played is None else played.unchanged)
-        playing, scale = player.playing, self.panel.color_scale(snapshot.tension)
+        scale, ghost = panel.color_scale(snapshot.tension), bool(panel.ghost.value)
         missing = None if isinstance(snapshot, InMotion) or snapshot.feasible else missing_of(snapshot)
-        ghost = bool(self.panel.ghost.value)
-        self._show(View(snapshot, settings, scale, ghost, self.wrench, played, missing, playing=playing))
+        view = View(snapshot, settings, scale, ghost, self.wrench, played, missing, playing=player.playing)
+        with self.server.atomic():
+            if played is not None:
+                self.scene.place(snapshot.pose)
+            elif is_underconstrained(self.robot):
+                self.scene.turn(snapshot.pose)
+            self.scene.show(snapshot, scale, settings.sag_scale, settings.error_scale, ghost=ghost)
+            traced = player.played, settings.error_scale
+            if player.played is not None and traced != self._traced:
+                self._traced = traced
+                self.scene.show_traces(*player.played.traces(TRACE_POINTS, settings.error_scale))
+        self._drawn = view
+        self._inform(view, self._live)
 
     def _from_gizmo(self, settings: Settings) -> Snapshot:
         if self._changed is None or self._changed[0] != settings.changes:
@@ -272,33 +297,21 @@ class Page:
             self.previous = snapshot.plan
         return snapshot
 
-    def _show(self, view: View) -> None:
-        snapshot, settings, played = view.snapshot, view.settings, self.player.played
-        with self.server.atomic():
-            if view.played is not None:
-                self.scene.place(snapshot.pose)
-            self.scene.show(snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
-            traced = self.player.number, self._extended, settings.error_scale
-            if played is not None and traced != self._traced:
-                self._traced = traced
-                self.scene.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
-        self.panel.verdict.content, self.panel.numbers.content = _readings(view)
-        sag = 0.0 if view.state is None else float(np.max(view.state.cables.sag))
-        self.panel.show_sag(sag, APART * self.size)
+    def _follow(self) -> None:
+        """Update readings and features for the view in the scene, and do the periodic work of the features."""
+        view, self._followed = self._drawn, time.monotonic()
+        if view is not None and view is not self.view:
+            self.panel.show(view, APART * self.size)
+            self._inform(view, self.features)
+            self._live = tuple(each for each in self.features if each.live and self._depended[each] is not None)
+            self.view = view
         for feature in self.features:
+            feature.tick()
+
+    def _inform(self, view: View, features: Sequence[Feature]) -> None:
+        """Let features follow a view if what they depend on has changed."""
+        for feature in features:
             key = feature.depends(view)
             if feature not in self._depended or self._depended[feature] != key:
                 self._depended[feature] = key
                 feature.follow(view)
-        self.view = view
-        self.updates += 1
-
-
-def _readings(view: View) -> tuple[str, str]:
-    """Verdict and numbers."""
-    snapshot, scale = view.snapshot, view.scale
-    if isinstance(snapshot, InMotion):
-        return snapshot.verdict, snapshot.numbers(scale)
-    frequencies = None if view.state is None else modes(view.state).frequency
-    compromise = None if view.missing is None else view.missing.state
-    return readout.verdict(snapshot), readout.numbers_html(snapshot, scale, frequencies, compromise)

@@ -6,14 +6,19 @@ from collections.abc import Callable
 from math import ceil, floor, log10
 from typing import Any
 
+import numpy as np
 import viser
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
+from sagline.statics.stiffness import modes
 from sagline.tension.method import TensionMethod
 from sagline.viewer import readout
+from sagline.viewer.feature import View
+from sagline.viewer.player import InMotion
 from sagline.viewer.snapshot import BY_HAND, METHODS, MODELS, ByHand, Settings, depends_on_history
 from sagline.viewer.tension_scale import TensionScale
 
@@ -49,6 +54,7 @@ class ControlPanel:
         self._changed, self._forget = changed, forget
         self.method_name = next(iter(METHODS))
         self._by_hand: ByHand | None = None
+        self._shown_scale = scale  # scale of the legend
         self._sliders: dict[str, viser.GuiHtmlHandle] = {}  # sliders of the factors by their labels
         self._gui.main_panel.dock_left()
         self._gui.main_panel.set_width(LEFT_WIDTH)
@@ -69,16 +75,25 @@ class ControlPanel:
         readings.expand()  # closed at first in the bottom sheet of a small screen
 
     def color_scale(self, tension: Array) -> TensionScale:
-        """Show and return the scale of colors for the tensions of a pose."""
-        own = self._colors.value == BY_POSE
-        scale = TensionScale.of_pose(tension, self._limits) if own else self._limits
-        self._legend.content = readout.legend(scale, self._robot, _ENDS_OF_POSE if own else "")
-        return scale
+        """The scale of colors for the tensions of a pose."""
+        return TensionScale.of_pose(tension, self._limits) if self._colors.value == BY_POSE else self._limits
 
-    def show_sag(self, sag: float, visible: float) -> None:
-        """Recommend a larger drawing if the largest sag [m] is too small to be seen."""
-        factor = float(self._sag_scale.value)
-        self._sag_hint.visible = 0.0 < sag * factor < visible
+    def show(self, view: View, visible: float) -> None:
+        """Write the readings of a view; a smaller sag than `visible` [m] cannot be seen."""
+        snapshot, scale, state = view.snapshot, view.scale, view.state
+        if scale != self._shown_scale:
+            ends = "" if scale is self._limits else _ENDS_OF_POSE
+            self._shown_scale, self._legend.content = scale, readout.legend(scale, self._robot, ends)
+        if isinstance(snapshot, InMotion):
+            self.verdict.content, self.numbers.content = snapshot.verdict, snapshot.numbers(scale)
+        else:
+            frequencies = None if state is None else modes(state).frequency
+            compromise = None if view.missing is None else view.missing.state
+            self.verdict.content = readout.verdict(snapshot)
+            self.numbers.content = readout.numbers_html(snapshot, scale, frequencies, compromise)
+        self.show_what_if("" if view.played is None else view.played.unchanged)
+        sag = 0.0 if state is None else float(np.max(state.cables.sag))
+        self._sag_hint.visible = 0.0 < sag * view.settings.sag_scale < visible
         if self._sag_hint.visible:
             text = f"The sag is {n(1e3 * sag, '.2g', 'mm')} or less, too small to be seen here. Draw it larger."
             self._sag_hint.content = readout.sentence(text)
@@ -107,8 +122,9 @@ class ControlPanel:
         """Show the controls that change the robot, or the reason why a played motion does not allow changes."""
         shown = not reason
         factors = (self._sliders[each.label] for each in (self._density, self._stiffness))
-        for handle in (self._mass, *factors, self._model, self.method):
+        for handle in (self._mass, *factors, self._model):
             handle.visible = shown
+        self.method.visible = shown and not is_underconstrained(self._robot)
         self._of_run.visible = not shown
         self._of_run.content = readout.html_block(f'<div class="quiet">{reason}</div>')
         self._forgetting.visible = shown and depends_on_history(self._tension())
@@ -156,7 +172,7 @@ class ControlPanel:
         return number
 
     def _watch(self, *handles: Any) -> None:
-        """Make controls call `changed` after every change."""
+        """Connect the controls: each change of a control calls `changed`."""
         for handle in handles:
             handle.on_update(lambda _: self._changed())
 

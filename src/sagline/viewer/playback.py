@@ -31,9 +31,8 @@ NO_CHOICE: Final = "In motion, tensions are not chosen: they follow from the len
 
 def _event_text(event: Occurrence, unit: ForceUnit) -> str:
     """Description of an event."""
-    what = event.kind if event.cable is None else f"{event.kind} of cable {event.cable}"
     before, after = unit.bare(event.tension_before), unit.written(event.tension_after)
-    return f"{what} at {event.time:.3f} s: {before} before, then at most {after}"
+    return f"{event.text} at {event.time:.3f} s: {before} before, then at most {after}"
 
 
 class PlayedPlan(Played):
@@ -108,6 +107,10 @@ class PlayedSimulation(Played):
         """Play a simulation."""
         self.simulation, self.robot = simulation, simulation.robot
         self.time = np.asarray(simulation.time - simulation.time[0])
+        self.tension = simulation.tensions.copy()  # NaN after a break
+        for event in simulation.events:
+            if event.kind == "break":
+                self.tension[simulation.time >= event.time, event.cable] = np.nan
 
     def at(self, time: float) -> InMotion:
         """The sample at or before a time [s]."""
@@ -115,16 +118,14 @@ class PlayedSimulation(Played):
         now = float(simulation.time[k])
         past = [event for event in simulation.events if event.time <= now]
         broken = [event.cable for event in past if event.kind == "break" and event.cable is not None]
-        tension = simulation.tensions[k].copy()
-        tension[broken] = np.nan
-        length, pose = np.asarray(simulation.length[k]), simulation.pose[k]
+        tension, length, pose = self.tension[k], np.asarray(simulation.length[k]), simulation.pose[k]
         energy = simulation.energy
         size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
         rows = [
             ("Cables", CABLES.get(simulation.cable_mass, simulation.cable_mass)),
             ("Time", f"{now - simulation.time[0]:.3f} s"),
             ("Speed", n(np.linalg.norm(simulation.twist[k, :3]), ".3g", "m/s")),
-            ("Tensions", f"{unit.bare(np.nanmin(tension))} to {unit.written(np.nanmax(tension))}"),
+            ("Tensions", unit.span(tension)),
             ("Energy error", n(energy.error[k], ".2g", "J", size=size)),
             *(("Event", _event_text(event, unit)) for event in past),
         ]
@@ -156,10 +157,9 @@ class PlayedSimulation(Played):
         """Charts of the tensions at the frame ends and the displacement, and the events."""
         simulation, robot, unit = self.simulation, self.robot, force_unit(self.robot)
         limits = chart_limits(robot, unit.newtons, at="frame_end")
-        tension_rows = self._tensions()
         cables = cable_names(robot)
         winch, newtons = "Tension at the winch", unit.newtons
-        tension = Chart(winch, unit.name, unit.decimals, cables, lambda rows: tension_rows[rows] / newtons, limits)
+        tension = Chart(winch, unit.name, unit.decimals, cables, lambda rows: self.tension[rows] / newtons, limits)
         position = simulation.pose.position
         away = Chart(
             "Motion along x, y, z", "mm", 1, ("x", "y", "z"), lambda rows: 1e3 * (position[rows] - position[0])
@@ -168,13 +168,5 @@ class PlayedSimulation(Played):
         marks = tuple(
             (event.time - began, _event_text(event, unit), event.kind in FAILURES) for event in simulation.events
         )
-        spans = limit_violations(robot, self.time, tension_rows, unit)
+        spans = limit_violations(robot, self.time, self.tension, unit)
         return Track(self.time, (tension, away), spans, marks, (("actual", ACTUAL),))
-
-    def _tensions(self) -> Array:
-        """Tensions (N, m), NaN after a break."""
-        simulation, tension = self.simulation, self.simulation.tensions.copy()
-        for event in simulation.events:
-            if event.kind == "break":
-                tension[simulation.time >= event.time, event.cable] = np.nan
-        return tension

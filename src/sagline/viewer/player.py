@@ -38,7 +38,7 @@ class InMotion:
     rest: Pose | None = None  # second pose to show
     truth: Pose | None = None  # true pose, if known
     nodes: Array | None = None  # positions of the cables at their nodes [m], shape (m, P, 3)
-    broken: list[int] = field(default_factory=list)  # True for broken cables
+    broken: list[int] = field(default_factory=list)  # numbers of the broken cables
     notice: str = ""  # label of a platform that is not feasible
 
     @property
@@ -51,11 +51,11 @@ class InMotion:
         return html_block(pose_line(self.pose) + cable_table_html(self.heads, self.columns, scale.colors(self.tension)))
 
     def courses(self, sag_scale: float) -> Array:
-        """Points of the cables from frame anchor to platform end (m, P, 3); a broken cable stays at its anchor."""
+        """Points of the cables from frame anchor to platform end (m, P, 3), NaN between pieces of a broken cable."""
         if self.nodes is not None:
-            courses = shapes.resampled(self.nodes, shapes.points_per_cable(self.robot))
-        else:
-            courses = self._catenaries(sag_scale)
+            return shapes.resampled(self.nodes, shapes.points_per_cable(self.robot))
+        courses = self._catenaries(sag_scale)
+        # a broken cable without mass is drawn as a point
         courses[self.broken] = self.robot.frame_anchors[self.broken, None]
         return courses
 

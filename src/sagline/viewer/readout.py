@@ -16,12 +16,13 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.batch import pulleys_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.margin import cable_margins, capacity_margin
 from sagline.viewer.server import chosen_by
 from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number_text
+from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, cables_text, force_unit, number_text
 
 EXACT: Final = 1e-9  # [m], smaller distances count as zero
 COMPROMISE: Final = "<div><b>Closest compromise</b>: tensions within the limits; the missing force is unbalanced</div>"
@@ -40,8 +41,8 @@ def sentence(text: str) -> str:
 
 def verdict(snapshot: Snapshot) -> str:
     """HTML of the verdict on feasibility in a colored box, with the reason if infeasible."""
-    if snapshot.solved:
-        return verdict_box("good", "Feasible", _summary(snapshot))
+    if snapshot.solved and snapshot.plan is not None:
+        return verdict_box("good", "Feasible", _summary(snapshot.plan.state, snapshot.error))
     return verdict_box("bad", headline(snapshot), escape(snapshot.reason))
 
 
@@ -156,18 +157,18 @@ def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:
     return kept
 
 
-def _summary(snapshot: Snapshot) -> str:
-    """Names and texts of the quantities of a feasible pose."""
-    unit = force_unit(snapshot.robot)
-    tension = snapshot.tension
-    rows = [
-        ("Tensions", f"{unit.bare(tension.min())} to {unit.written(tension.max())}"),
-        ("Nearest limit", _nearest_limit(snapshot, unit)),
-    ]
-    if snapshot.plan is not None:
-        extra = unit.written(float(capacity_margin(snapshot.plan.state)))
+def _summary(state: Equilibrium, error: Array | None) -> str:
+    """Names and texts of the quantities of a feasible pose, whose confirmed pose has a position `error` (3,) [m]."""
+    unit = force_unit(state.one_robot)
+    rows = [("Tensions", unit.span(state.chord_tension)), ("Nearest limit", _nearest_limit(state, unit))]
+    if is_underconstrained(state.one_robot):
+        rows.append(
+            ("Rotation", f"from the balance of {state.one_robot.cable_count} cables; only the position is given")
+        )
+    else:
+        extra = unit.written(float(capacity_margin(state)))
         rows.append(("Spare force", f"{extra} more in any direction, no moment; redistributed tensions"))
-    if (error := snapshot.error) is not None:
+    if error is not None:
         away = float(np.linalg.norm(error))
         rows.append(
             ("Equilibrium", f"{n(away, unit='m')} from the planned pose" if away > EXACT else "at the planned pose")
@@ -182,15 +183,16 @@ def _ends(robot: Robot) -> str:
     return f"ends: {low}, {high}"
 
 
-def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
+def _nearest_limit(state: Equilibrium, unit: ForceUnit) -> str:
     """Text of the tension nearest to its limit, with limit and distance, or text of all tensions at their limits."""
-    margin, robot = snapshot.margin, snapshot.robot
+    margin, robot = cable_margins(state), state.one_robot
     reach = _ALONE * float(np.nanmax(np.where(np.isfinite(robot.tension_max), robot.tension_max, margin.max())))
     at = np.flatnonzero(margin <= reach)
     if len(at) > 1:
-        return f"reached by cables {', '.join(map(str, at))}"
+        return f"reached by {cables_text(at)}"
     nearest = int(np.argmin(margin))
-    which = snapshot.nearer_limit(nearest)
+    lower = margin[nearest] == state.limited_tension[nearest] - robot.tension_min[nearest]
+    which = "lower limit" if lower else "upper limit"
     if len(at):
         return f"reached by cable {nearest} ({which})"
     return f"{unit.written(margin[nearest])} away (cable {nearest}, {which})"
@@ -219,20 +221,13 @@ def _cable_numbers(robot: Robot, state: Equilibrium | None, scale: TensionScale)
         "length<br>[m]": (length, ".4f"),
         "sag<br>[mm]": (sag, ".1f"),
         f"to limit<br>[{unit.name}]": (margin / unit.newtons, unit.form),
-        **_wrap_column(robot, state),
     }
+    radius, contact = pulleys_of(robot).radius, None if state is None else state.contact
+    if radius.any():
+        angle = unknown if contact is None else np.degrees(contact.wrap_angle)
+        columns["wrap<br>[°]"] = np.where(radius > 0.0, angle, np.nan), ".1f"
     texts = [[number_text(value, form) for value in values] for values, form in columns.values()]
     return cable_table_html(("cable", *columns), texts, scale.colors(tension))
-
-
-def _wrap_column(robot: Robot, state: Equilibrium | None) -> dict[str, tuple[Array, str]]:
-    """Wrap angles [degree] and their format, for a robot with pulleys."""
-    radius = pulleys_of(robot).radius
-    if not radius.any():
-        return {}
-    contact = None if state is None else state.contact
-    angle = np.full(radius.shape, np.nan) if contact is None else np.degrees(contact.wrap_angle)
-    return {"wrap<br>[°]": (np.where(radius > 0.0, angle, np.nan), ".1f")}
 
 
 def _pulley_line(robot: Robot) -> str:
@@ -249,21 +244,16 @@ def _pulley_line(robot: Robot) -> str:
 
 
 def _listed(frequencies: Array | None) -> str:
+    """Text of the natural frequencies [Hz]; a frequency with a mode is a button that animates this mode."""
     if frequencies is None or not np.isfinite(frequencies).any():
         return ""
-    words = [_pressed(k, value) for k, value in enumerate(frequencies)]
+    words = [number_text(frequency, ".2f") for frequency in frequencies]
+    for k in np.flatnonzero(frequencies > 0.0):  # not NaN
+        name, label = f"{MASSLESS} {k + 1}", f'aria-label="{words[k]} Hz: move mode {MASSLESS} {k + 1}"'
+        words[k] = f'<button class="shake" {chosen_by("mode", name)} {label}>{words[k]}</button>'
     ends = [*[","] * (len(words) - 1), " Hz"]  # these characters stay on the line of the number
     text = " ".join(f'<span class="whole">{word}{end}</span>' for word, end in zip(words, ends, strict=True))
     return f'<div style="margin-top:4px"><b>Natural frequencies</b> {text}</div>'
-
-
-def _pressed(mode: int, frequency: float) -> str:
-    """A frequency [Hz]. If the frequency has a mode, it is a button that animates the mode."""
-    text = number_text(frequency, ".2f")
-    if not frequency > 0.0:  # also excludes NaN
-        return text
-    name = f"{MASSLESS} {mode + 1}"
-    return f'<button class="shake" {chosen_by("mode", name)} aria-label="{text} Hz: move mode {name}">{text}</button>'
 
 
 def _material_line(snapshot: Snapshot) -> str:

@@ -13,6 +13,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.robot.batch import pulleys_of
 from sagline.robot.checks import ROTATING
 from sagline.robot.pose import Pose, unit
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.viewer import shapes
 from sagline.viewer.player import Configuration, InMotion
@@ -114,7 +115,7 @@ GHOST = (128, 134, 142)
 CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # line widths [px]
 TRACE_POINTS = 600
 NEAR = 0.03  # anchors closer than this have one label, as a share of the robot's size
-FAR = 5.0  # largest valid distance of the platform from the middle, as a share of the robot's size
+FAR = 5.0  # largest valid distance of the platform from the middle of the robot, as a share of the robot's size
 ROUNDING: Final = 1e-12  # smaller components of a pose from a browser are rounding errors [m], or of a quaternion
 APART = 0.0035  # smallest visible distance between chord and cable, as a share of the robot's size
 _ARM = 0.12  # longest arm of the axes, as a share of the robot's size
@@ -178,6 +179,10 @@ class RobotScene:
     def place(self, pose: Pose) -> None:
         """Move the platform and its gizmo to a pose."""
         self._gizmo.position = pose.position
+        self._gizmo.wxyz = np.roll(pose.quaternion, 1)
+
+    def turn(self, pose: Pose) -> None:
+        """Give the platform and its gizmo the rotation of a pose."""
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def show(
@@ -294,7 +299,7 @@ class RobotScene:
             depth_test=True,  # drawn in front of objects behind the platform
             opacity=0.8,
             active_axes=(bool(free[0]), bool(free[1]), bool(free[2])),
-            disable_rotations=robot.motion_pattern not in ROTATING,
+            disable_rotations=robot.motion_pattern not in ROTATING or is_underconstrained(robot),
         )  # fmt: skip
 
 

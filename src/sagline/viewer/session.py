@@ -87,7 +87,7 @@ class PlayedLog(Played):
             if pose is not None and other is not None and np.isfinite(other).all():
                 rows.append((name, n(PER_METER * float(np.linalg.norm(pose.position - other)), ".3g", "mm")))
         if np.isfinite(tension).any():
-            rows.append(("Tensions", f"{unit.bare(np.nanmin(tension))} to {unit.written(np.nanmax(tension))}"))
+            rows.append(("Tensions", unit.span(tension)))
         past = [event for event in self.events if event.time <= self.began + self.time[k]]
         rows += [(f"{event.time - self.began:.2f} s", f"{event.name}: {event.text}") for event in past[-MOST_EVENTS:]]
         heads = ("cable", f"tension<br>[{unit.name}]", "minus planned<br>[N]", "set minus read<br>[mm]")

@@ -40,7 +40,7 @@ def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
 
 
 def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
-    """Both ends of every free cable in the world [m], shape (m, 2, 3), starting at its exit point or frame anchor."""
+    """Both ends of every free cable in the world [m], shape (m, 2, 3): `exits` or frame anchor, then platform end."""
     platform_ends = pose.transform(robot.platform_anchors)
     return locked(np.stack((robot.frame_anchors if exits is None else exits, platform_ends), axis=1))
 
@@ -104,16 +104,19 @@ def courses(robot: Robot, pose: Pose, state: Equilibrium | None, sag_scale: floa
 
 
 def resampled(points: Array, count: int) -> Array:
-    """`points` (m, P, 3), interpolated at `count` equal steps, shape (m, count, 3)."""
+    """`points` (m, P, 3), interpolated at `count` equal steps, shape (m, count, 3). NaN separates pieces of a line."""
     place = np.linspace(0.0, points.shape[1] - 1.0, count)
     first = np.minimum(place.astype(np.intp), points.shape[1] - 2)
     rest = (place - first)[:, None]
-    return np.asarray((1.0 - rest) * points[:, first] + rest * points[:, first + 1])
+    mixed = (1.0 - rest) * points[:, first] + rest * points[:, first + 1]
+    return np.where(np.isnan(mixed), points[:, np.round(place).astype(np.intp)], mixed)  # up to the end of a piece
 
 
 def segments(points: Array, *, dashed: bool, shown: NDArray[np.bool_] | None = None) -> Array:
-    """Consecutive points (m, P, 3) as segments (m (P - 1), 2, 3)."""
+    """Consecutive points (m, P, 3) as segments (m (P - 1), 2, 3). At NaN, their length is zero."""
     pairs = np.stack((points[:, :-1], points[:, 1:]), axis=2)
+    gaps = np.isnan(pairs).any(axis=(2, 3))
+    pairs[gaps] = np.repeat(points[:, :1], points.shape[1] - 1, axis=1)[gaps][:, None]
     if dashed:
         pairs[:, 1::2, 1] = pairs[:, 1::2, 0]
     if shown is not None:
@@ -121,8 +124,6 @@ def segments(points: Array, *, dashed: bool, shown: NDArray[np.bool_] | None = N
         pairs[hidden, 1] = pairs[hidden, 0]
     return np.asarray(pairs.reshape(-1, 2, 3))
 
-
-Faces = NDArray[np.int64]
 
 _BEAM = 0.0045  # thickness of the frame's beams, as a share of the robot's size
 _DASH = 0.02  # length of a dash of an assumed frame, as a share of the robot's size
@@ -138,7 +139,7 @@ class Solid(NamedTuple):
     """A closed surface."""
 
     vertices: Array  # corners [m], shape (v, 3)
-    faces: Faces  # triangles, as indices of corners, counter-clockwise from outside, shape (f, 3)
+    faces: Indices  # triangles, as indices of corners, counter-clockwise from outside, shape (f, 3)
 
 
 def size_of(robot: Robot) -> float:
@@ -204,18 +205,13 @@ def wheel() -> Solid:
     from trimesh.creation import annulus  # an optional dependency that figures do not require
 
     rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
-    spokes = [rod(np.array([inner, outer]), _SPOKE) for inner, outer in _spokes()]
+    angle = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
+    out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
+    spokes = [rod(np.array([_WHEEL[1][1] * way, _WHEEL[0][0] * way]), _SPOKE) for way in out]
     corners = [Solid(ring, np.arange(len(ring)).reshape(-1, 3)) for ring in (rim, hub)]
     lying = _merged([*corners, *spokes])
     x, y, z = lying.vertices.T
     return Solid(np.stack((1.0 + x, -z, y), axis=1), lying.faces)
-
-
-def _spokes() -> Array:
-    """Inner and outer ends of the spokes of a horizontal wheel, shape (k, 2, 3)."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
-    out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
-    return np.stack((_WHEEL[1][1] * out, _WHEEL[0][0] * out), axis=1)
 
 
 def pulley_rotations(robot: Robot, pose: Pose) -> Array:
@@ -296,29 +292,26 @@ def _hull(points: Array) -> Solid:
 THINNEST: Final = 0.03  # smallest axis of a drawn ellipsoid, relative to its longest axis
 
 
-class Ellipsoids(NamedTuple):
-    """Ellipsoids of errors."""
+def error_ellipsoids(covariance: Array) -> tuple[Indices, Array, Array]:
+    """Ellipsoids of points whose errors, with `covariance` (N, 3, 3) [m^2], are known and not zero.
 
-    middle: Array  # centers [m], shape (k, 3)
-    turn: Array  # rotations of the axes, quaternions, scalar first, shape (k, 4)
-    radius: Array  # standard errors along the axes [m], shape (k, 3)
-    which: Indices  # indices of the points, shape (k,)
+    Returns:
+        Indices of these points, shape (k,); standard errors along the axes [m], shape (k, 3); and the axes, one per
+        column, shape (k, 3, 3).
+    """
+    which = np.flatnonzero(np.isfinite(covariance).all(axis=(1, 2)) & covariance.any(axis=(1, 2))).astype(np.int64)
+    squares, axes = np.linalg.eigh(covariance[which])
+    return which, np.sqrt(np.maximum(squares, 0.0)), axes
 
-    @classmethod
-    def of(cls, points: Array, covariance: Array) -> Ellipsoids:
-        """Ellipsoids of points; points with unknown or zero errors are omitted."""
-        known = np.isfinite(covariance).all(axis=(1, 2)) & covariance.any(axis=(1, 2))
-        which = np.flatnonzero(known).astype(np.int64)
-        squares, axes = np.linalg.eigh(covariance[which])
-        mirrored = np.linalg.det(axes) < 0.0
-        axes[mirrored, :, 0] *= -1.0
-        turn = Rotation.from_matrix(axes).as_quat()[:, [3, 0, 1, 2]] if len(which) else np.zeros((0, 4))
-        return cls(points[which], turn, np.sqrt(np.maximum(squares, 0.0)), which)
 
-    def drawn(self, factor: float) -> Array:
-        """Radii for the drawing, scaled by a factor [m], shape (k, 3)."""
-        longest = self.radius.max(axis=1, keepdims=True)
-        return np.asarray(factor * np.maximum(self.radius, THINNEST * longest))
+def placed_balls(lengths: Array, axes: Array) -> tuple[Array, Array]:
+    """Quaternions (k, 4), scalar first, and semi-axes (k, 3) of balls with semi-axes `lengths` along `axes` (k, 3, 3).
+
+    Thin ellipsoids become thicker, so that they are visible.
+    """
+    axes = np.where(np.linalg.det(axes)[:, None, None] < 0.0, axes * [-1.0, 1.0, 1.0], axes)
+    turns = Rotation.from_matrix(axes).as_quat()[:, [3, 0, 1, 2]]
+    return turns, np.maximum(lengths, THINNEST * lengths.max(axis=1, keepdims=True))
 
 
 def readable(radius: Array, size: float) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import floor, log10
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, Indices
 from sagline.viewer.readout import color_key, html_block
+from sagline.viewer.shapes import round_below
 from sagline.viewer.tension_scale import Colors, ForceUnit
 from sagline.workspaces.levels import Slice
 
@@ -34,8 +34,7 @@ class MarginScale:
     def up_to(cls, largest: float) -> MarginScale:
         """Bands of a round width; the last bounded band ends near the largest margin [N]."""
         coarse = largest / INSIDE if np.isfinite(largest) and largest > 0.0 else 1.0
-        power = 10.0 ** floor(log10(coarse))
-        return cls(max(times * power for times in (1.0, 2.0, 5.0) if times * power <= coarse * (1.0 + 1e-9)))
+        return cls(round_below(coarse))
 
     @property
     def edges(self) -> Array:

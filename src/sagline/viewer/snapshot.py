@@ -11,8 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import MODELS as ALL_MODELS
-from sagline.cables.models import Catenary, Elastic, Empirical
+from sagline.cables.models import Catenary, Elastic, Empirical, models_by_name
 from sagline.core.arrays import Array
 from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.kinematics.confirm import confirm
@@ -21,11 +20,10 @@ from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot, with_mass
-from sagline.tension.margin import cable_margins
 from sagline.tension.method import TensionMethod, shared_tension
-from sagline.tension.methods import DEFAULT, QuadraticProgram
-from sagline.tension.methods import METHODS as ALL_METHODS
+from sagline.tension.methods import DEFAULT, QuadraticProgram, methods_by_name
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import force_unit
 
@@ -66,12 +64,12 @@ def depends_on_history(method: TensionMethod) -> bool:
 
 
 # the exact model first
-MODELS: Final = MappingProxyType({model_name(make()): make() for make in reversed(ALL_MODELS.values())})
+MODELS: Final = MappingProxyType({model_name(make()): make() for make in reversed(models_by_name().values())})
 # methods that depend on history are last, so that the default depends only on the pose
 METHODS: Final = MappingProxyType(
     {
         method_name(method): method
-        for method in sorted((make() for make in ALL_METHODS.values()), key=depends_on_history)
+        for method in sorted((make() for make in methods_by_name().values()), key=depends_on_history)
     }
 )
 
@@ -143,6 +141,8 @@ class Snapshot:
         shortfall = float(self.plan.shortfall)
         missing = force_unit(self.robot).written(shortfall)
         short = f"short of {missing}" if np.isfinite(shortfall) else "no force alone is sufficient"
+        if is_underconstrained(self.robot):
+            short = "no equilibrium at this position is within the limits"
         blocking = ", ".join(str(i) for i in np.flatnonzero(self.plan.blocking))
         return f"{short}; at their limits: cables {blocking}" if blocking else short
 
@@ -152,24 +152,12 @@ class Snapshot:
         return np.full(self.robot.cable_count, np.nan) if self.plan is None else self.plan.chord_tension
 
     @property
-    def margin(self) -> Array:
-        """Distance (m,) [N] from each limited tension to the nearer limit of its cable; NaN without a solution."""
-        return self.tension if self.plan is None else cable_margins(self.plan.state)
-
-    def nearer_limit(self, cable: int) -> str:
-        """Name of the limit that is nearer to a cable's tension."""
-        if self.plan is None:
-            return ""
-        tension, robot = self.plan.state.limited_tension[cable], self.robot
-        lower = tension - robot.tension_min[cable] <= robot.tension_max[cable] - tension
-        return "lower limit" if lower else "upper limit"
-
-    @property
     def origin(self) -> str:
         """Cable model and tension distribution method; "" without tensions."""
         if self.plan is None:
             return ""
-        return f"{model_name(self.plan.state.cables.model)}, {method_name(self.plan.tension)}"
+        how = "balance" if is_underconstrained(self.robot) else method_name(self.plan.tension)
+        return f"{model_name(self.plan.state.cables.model)}, {how}"
 
     @property
     def error(self) -> Array | None:
@@ -187,11 +175,15 @@ def snapshot_at(
 ) -> Snapshot:
     """Solution at rest at a pose, for a robot to which the changes of the settings have already been applied."""
     reference = _remembered(previous, settings.tension)
+    if is_underconstrained(robot):  # the rotation follows from the balance, and does not depend on the previous pose
+        pose = Pose(pose.position, np.eye(3))
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
     except CableGeometryError as error:
         reason = "" if robot.winches is None else str(error).removeprefix("pose, ")
         return Snapshot(robot, pose, None, None, reason, reference)
+    if is_underconstrained(robot):
+        pose = plan.state.pose
     approximate = not isinstance(settings.model, Catenary) and bool(plan.feasible)
     return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None, "", reference)
 

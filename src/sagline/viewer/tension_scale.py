@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isfinite, log, log10
 from typing import Final, NamedTuple
@@ -22,6 +23,12 @@ CABLES: Final[tuple[Color, ...]] = (
     (80, 140, 150), (196, 146, 96), (124, 164, 30), (160, 60, 80),
 )  # fmt: skip
 NONE: Final[Color] = (150, 155, 162)  # color without a limiting cable
+
+
+def cables_text(cables: Iterable[int]) -> str:
+    """Numbers of cables, "cables 1, 2"."""
+    numbers = [str(cable) for cable in cables]
+    return f"cable{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"
 
 
 def cable_color(cable: int) -> Color:
@@ -120,6 +127,10 @@ class ForceUnit(NamedTuple):
     def written(self, force: float) -> str:
         """A force [N] with the unit."""
         return f"{self.bare(force)} {self.name}"
+
+    def span(self, forces: Array) -> str:
+        """Lowest and highest of the known `forces` [N], with the unit."""
+        return f"{self.bare(np.nanmin(forces))} to {self.written(np.nanmax(forces))}"
 
 
 def number_text(value: float, form: str) -> str:

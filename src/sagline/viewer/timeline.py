@@ -14,7 +14,7 @@ from sagline.core.arrays import Array
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
-from sagline.viewer.tension_scale import ForceUnit
+from sagline.viewer.tension_scale import ForceUnit, cables_text
 
 # Colors of cables by number in charts, different from those of the platform, its path, tensions and verdicts. Their
 # contrast is 3 : 1 on the panels of both themes.
@@ -118,7 +118,7 @@ def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ..
         elif known.size:
             parts.append(f"short of up to {unit.written(float(known.max()))}")
         blocking = np.flatnonzero(plan.blocking[rows][lost].any(axis=0))
-        return ": ".join(parts) + (f"; at their limits: {_cables(blocking)}" if blocking.size else "")
+        return ": ".join(parts) + (f"; at their limits: {cables_text(blocking)}" if blocking.size else "")
 
     return spans_of(time, ~plan.solved, why)
 
@@ -138,14 +138,10 @@ def limit_violations(robot: Robot, time: Array, tension: Array, unit: ForceUnit)
             if cables.size:
                 reached = float(worst.reduce(tension[rows][:, cables], axis=None))
                 limit = unit.written(float(limits[cables[0]]))
-                parts.append(f"{_cables(cables)} {word} {limit}: {unit.written(reached)} at the winch")
+                parts.append(f"{cables_text(cables)} {word} {limit}: {unit.written(reached)} at the winch")
         return "; ".join(parts)
 
     return spans_of(time, np.asarray((below | above).any(axis=1)), why)
-
-
-def _cables(which: NDArray[np.intp]) -> str:
-    return f"cable{'s' if which.size > 1 else ''} {', '.join(map(str, which))}"
 
 
 MOST_COLUMNS: Final = 1500  # largest number of columns
@@ -199,7 +195,7 @@ def _track_message(
     name: str, track: Track, chart: Chart, part: Columns, near: Sequence[ChartLimit], *, first: bool
 ) -> dict[str, Any]:
     digits, (times, low, high) = chart.decimals + 1, part
-    far = [f"{limit[1]} {limit[0]:g} {chart.unit}" for limit in chart.limits if limit not in near]
+    far = [limit for limit in chart.limits if limit not in near]
     return {
         "name": name,
         "title": chart.title,
@@ -212,7 +208,7 @@ def _track_message(
         "low": [_finite(line, digits) for line in low.T],
         "high": None if high is low else [_finite(line, digits) for line in high.T],
         "limits": [limit for limit in chart.limits if limit in near],
-        "far": ", ".join(far) if first else "",
+        "far": ", ".join(f"{title} {value:g} {chart.unit}" for value, title, _ in far) if first else "",
         "spans": track.spans,
         "marks": _most_important(track),
         "paths": [[path, f"rgb{color}"] for path, color in track.paths],
@@ -221,9 +217,13 @@ def _track_message(
 
 def _most_important(track: Track) -> list[TimelineMark]:
     """Marks of a track. If there are too many marks, the faults and the last of the other marks."""
-    bad = [mark for mark in track.marks if mark[2]][-MOST_MARKS:]
-    rest = [mark for mark in track.marks if not mark[2]]
-    return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)
+    if len(track.marks) <= MOST_MARKS:
+        return sorted(track.marks)
+    bad, rest = (
+        [(time, text, is_bad) for time, text, is_bad in track.marks if is_bad is kind] for kind in (True, False)
+    )
+    bad = bad[-MOST_MARKS:]
+    return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :])
 
 
 def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, float, list[ChartLimit]]:
@@ -233,8 +233,10 @@ def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, fl
     low, high = (float(lows.min()), float(highs.max())) if lows.size and highs.size else (0.0, 1.0)
     spread = max(high - low, 1e-6 * max(abs(high), 1.0))
     limits = [limit for chart in charts for limit in chart.limits]
-    near = [limit for limit in limits if low - _NEAR * spread <= limit[0] <= high + _NEAR * spread]
-    low, high = min([low, *(limit[0] for limit in near)]), max([high, *(limit[0] for limit in near)])
+    least, most = low - _NEAR * spread, high + _NEAR * spread
+    near = [(value, title, upper) for value, title, upper in limits if least <= value <= most]
+    values = [value for value, _, _ in near]
+    low, high = min([low, *values]), max([high, *values])
     return low - _BORDER * spread, high + _BORDER * spread, near
 
 

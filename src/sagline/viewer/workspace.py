@@ -113,7 +113,9 @@ class Hull:
     @classmethod
     def of(cls, vertices: Array, faces: Indices, margin: Array, cable: Indices, on_box: Flags, text: str) -> Hull:
         """Hull from the limiting cable at each vertex."""
-        owner = np.where(on_box, -1, _majority(cable[faces]))
+        first, second, third = cable[faces].T
+        majority = np.where(second == third, second, first)  # the first cable if all three differ
+        owner = np.where(on_box, -1, majority)
         patches = [Patch.of(vertices, faces[owner == k], cable_color(k)) for k in np.unique(owner).tolist()]
         corners = vertices[faces]
         longest = float(np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(initial=0.0))
@@ -200,11 +202,6 @@ def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bo
     if query.broken:  # the reason would give the numbers of the remaining cables
         return empty
     return f"{empty}<br>{escape(nearest_to(query.levels(), found.grid, region.box.low, region.box.high).reason)}"
-
-
-def _majority(cables: Indices) -> Indices:
-    """The cable of most corners of each face. If all three cables differ, the first of them."""
-    return np.where(cables[:, 1] == cables[:, 2], cables[:, 1], cables[:, 0])
 
 
 BESIDE: Final = 0.01  # distance of patches from their wall, relative to the reach; avoids hidden parts
@@ -328,7 +325,7 @@ def travel_text(found: FreeTravel, unit: ForceUnit, without: str = "") -> str:
         nearest = min(crossed, key=lambda k: float(found.distance[k]))
         length, way = f"{found.distance[nearest]:.3f} m", NAMES[found.which[nearest]]
         head += f"<b>Boundary</b> {length} along {way}" if found.inside else f"<b>Workspace</b> {length} along {way}"
-        head += _limited(int(found.cable[nearest]))
+        head += f", cable {found.cable[nearest]} limits" if found.cable[nearest] >= 0 else ""
     else:
         head += "No boundary along any axis within the robot's box."
     rows = "".join(
@@ -337,10 +334,6 @@ def travel_text(found: FreeTravel, unit: ForceUnit, without: str = "") -> str:
         for which, distance, crossed, cable in zip(found.which, found.distance, found.crossed, found.cable, strict=True)
     )
     return html_block(f"{head}<table><tr><th>direction</th><th>length</th><th>ends at</th></tr>{rows}</table>")
-
-
-def _limited(cable: int) -> str:
-    return f", cable {cable} limits" if cable >= 0 else ""
 
 
 def _end(crossed: bool, cable: int, inside: bool) -> str:

@@ -31,7 +31,6 @@ from sagline.workspaces.region import Region
 from sagline.workspaces.surface import (
     Components,
     Surface,
-    components_of,
     labels_of,
     normals_of,
     vertex_areas,
@@ -41,24 +40,24 @@ from sagline.workspaces.surface import (
 MOST_CELLS: Final = 128  # along an axis
 MOST_HALVED: Final = 256  # largest number of cells along an axis; this gives 17 million nodes, 0.5 GB
 MOST_HALVINGS: Final = 3
-AT_NODE: Final = 1e-10  # a vertex is moved to a node if it is closer than this share of a grid edge
+AT_NODE: Final = 1e-10  # a vertex moves to a node if it is closer to the node than this share of a grid edge
 FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Boundary(Result):
-    """Result of `boundary`.
+    """Boundary of a set of positions, with volume and components: the result of `boundary`.
 
     Attributes:
         surface: The boundary, closed along the faces of the box. Vertices that are not on a face of the box are on the
             boundary, with an error of at most 1e-10 of a cell.
-        volume: Volume of the set within the box [m^3]. It is the volume that the surface encloses, plus the volume
-            between the flat triangles and the curved boundary.
+        volume: Volume of the set within the box [m^3]. The number is the volume that the surface encloses, plus the
+            volume between the flat triangles and the curved boundary.
         volume_error: Error bound of the volume [m^3]. The bound neglects parts and gaps that are thinner than two cells
             of the finest grid.
         grid: Values of the function at the nodes of the grid before refinement.
         components: Components of the set. Two parts are one component if a walk between them was found.
-        open_faces: Faces of the box that the set reaches, for example "x low". The set may continue beyond these faces.
+        open_faces: Faces of the box that the set reaches, for example "x low". The set may continue beyond them.
         evaluations: Number of positions at which the function was evaluated.
     """
 
@@ -80,11 +79,11 @@ def boundary(
 ) -> Boundary:
     """Boundary, in a box [m], of the set in which `level`, a function of positions (N, 3) [m], is nonnegative.
 
-    `level` may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid. `cells` is the
-    number of cells along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine`
-    times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. The vertices of the
-    net are on the edges of the grid. The volume between net and boundary, and the error bound, are computed from the
-    distances of the triangles' centers to the boundary.
+    `level` may have jumps and infinite values, but not NaN. The function is evaluated at the nodes of a grid. `cells`
+    is the number of cells along the longest side, or along each axis. The cells on the boundary are then halved
+    `refine` times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. The
+    vertices of the net are on the edges of the grid. The volume between net and boundary, and the error bound, are
+    computed from the distances of the triangles' centers to the boundary.
     """
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):
@@ -115,18 +114,35 @@ def boundary(
     volumes = volumes_of(surface.vertices, surface.faces)
     volumes[curved] += between
     volume, error = float(volumes.sum()), float(errors.sum())
-    components = components_of(grid, labels_of(counted, grid)[0], net.inner, net.faces, volumes)
+    components = _components_of(grid, labels_of(counted, grid)[0], net.inner, net.faces, volumes)
     return Boundary(surface, volume, error, first, components, open_faces, count)
 
 
-INWARD: Final = 0.01  # distance, relative to a cell, from a vertex to the position at which the slope is computed
+def _components_of(grid: Grid, nodes: NDArray[np.int32], inner: Indices, faces: Indices, volumes: Array) -> Components:
+    """Components of a set, without a proof that they are separate.
+
+    Arguments: `grid`; `nodes`, the labels of its nodes, 1 and higher in the set; `inner` and `faces`, the inner nodes
+        and the triangles of the set's net; `volumes` (F,) [m^3] of the triangles.
+    """
+    count = int(nodes.max())
+    vertices = nodes[tuple(inner.T)] - 1
+    volume = np.bincount(vertices[faces[:, 0]], volumes, minlength=count)
+    order = np.argsort(-volume, kind="stable")
+    rank = np.empty(count + 1, dtype=np.int32)
+    rank[order], rank[-1] = np.arange(count), -1  # the label 0 (outside) becomes the index -1
+    labels = locked(np.ascontiguousarray(rank[nodes - 1]))
+    separate = locked(np.full(count, count == 1))
+    return Components(locked(volume[order]), locked(rank[vertices]), grid.x, grid.y, grid.z, labels, separate)
+
+
+INWARD: Final = 0.01  # distance between a vertex and the position at which its slope is computed, relative to a cell
 
 
 def uncertain_volume(level: Level, surface: Surface, uncertainty: Array, cell: float) -> float:
     """Volume [m^3] between the boundaries of two level functions that differ by `uncertainty`, (V,), at the vertices.
 
-    The slope at a vertex uses a position inside the set. cell: edge of a cell [m]; the distance between the two
-    boundaries is limited to this length.
+    The slope at a vertex is computed with a position inside the set. cell: edge of a cell [m], which is also the
+    largest distance between the two boundaries.
     """
     k = np.flatnonzero(uncertainty > 0.0)
     if not len(k):
@@ -154,7 +170,7 @@ def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int,
 def _place_vertices(
     net: Net, grid: Grid, level: Level, *, precision: float = 1e-10, narrow: float = 1e-12
 ) -> tuple[Net, Array, Array]:
-    """Net, vertices (V, 3) [m] on the exact boundary, and the function's decrease along the edges of the net [1/m]."""
+    """Net, its vertices (V, 3) [m] on the exact boundary, and the decrease of the function along its edges [1/m]."""
     inner, outer = grid.positions(net.inner), grid.positions(net.outer)
     at_inner, at_outer = grid.values[tuple(net.inner.T)], grid.values[tuple(net.outer.T)]
     k = np.flatnonzero((net.inner != net.outer).any(axis=1))
@@ -167,13 +183,13 @@ def _place_vertices(
         return net, vertices, slope
     one = merge_vertices(net.inner, np.where(at_node[:, None], net.inner, net.outer), net.faces, grid.values.shape)
     kept = Surface(vertices[one.first], one.faces)
-    if not kept.closed:  # the two sides of a sheet without thickness are not merged
+    if not kept.closed:  # a sheet without thickness keeps its two sides
         return net, vertices, slope
     return one, kept.vertices, np.where(at_node, np.nan, slope)[one.first]
 
 
 def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:
-    """Decrease of the function along the normal of each triangle [1/m], by least squares from the vertices' slopes."""
+    """Decrease of the function along the normal of each triangle [1/m]: least squares from slopes at the vertices."""
     normals = normals_of(vertices, faces)
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = np.abs(normals) / np.linalg.norm(normals, axis=1)[:, None]
@@ -191,13 +207,13 @@ def _faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]
 
 
-MEAN: Final = 3.0 / 4.0  # mean distance of a triangle from a curved boundary, divided by that of its center
+MEAN: Final = 3.0 / 4.0  # mean distance between a triangle and a curved boundary, divided by the distance at its center
 MISSED: Final = 5.0 / 12.0  # largest relative error of the mean distance
-FLAT: Final = 1e-6  # distances that are smaller, relative to the reach of the search, are ignored
+FLAT: Final = 1e-6  # smaller distances, relative to the reach of the search, are ignored
 
 
 def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
-    """Volumes between triangles and boundary [m^3], negative inward, and error bars of these volumes, both (F,)."""
+    """Volumes (F,) between triangles and boundary [m^3], negative inward, and error bars of these volumes, (F,)."""
     normals = normals_of(vertices, faces)
     area = np.linalg.norm(normals, axis=1)
     normals = normals / np.maximum(area, np.finfo(np.float64).tiny)[:, None]
@@ -230,7 +246,7 @@ def _distances_to_boundary(
 
 
 def _between(level: Level, ends: Brackets) -> Array:
-    """Position of the sign change between `ends`, by interpolation, or by iteration if an end value is infinite."""
+    """Position of the sign change between `ends`: interpolated, or by iteration if a value at an end is infinite."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
         share = at_inner / (at_inner - at_outer)
@@ -253,7 +269,7 @@ class Outline(Result):
         on_box: True for triangles on a face of the box, shape (F,).
         open_faces: Faces of the robot's box that the workspace reaches, for example "x low".
         volume: Volume [m^3], or area in a plane [m^2], enclosed by the triangles.
-        parts: Number of components; walks between them are not searched.
+        parts: Number of components, without a search for walks between components.
         grid: The level at the nodes.
     """
 

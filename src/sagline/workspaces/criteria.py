@@ -1,6 +1,6 @@
 """Criteria of a workspace: margin, sag, position error, stiffness, frequency, clearance and frame.
 
-Criteria on tensions use the tensions for the middle load of the wrench set.
+Criteria that need tensions use the tensions under the middle load of the wrench set.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
-from sagline.statics.stiffness import compliance_of, modes
+from sagline.statics.stiffness import least_stiffness, modes
 from sagline.workspaces.criterion import NOT_NEGATIVE, POSITIVE, Criterion, Given, Judged
 
-_PRECISION: Final = 1e-6  # [m], smaller jumps of the clearance between neighboring poses are acceptable
+_PRECISION: Final = 1e-6  # [m], jumps of the clearance between neighboring poses up to this size are acceptable
 _CABLE: Final = re.compile(r"cable (\d+)")
 _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastMargin(Criterion):
-    """The cables balance every wrench of the set, plus an additional load, the reserve, in any direction.
+    """The cables balance every wrench of the set plus a reserve: an additional load in any direction.
 
-    This is the first criterion of every workspace; its default reserve is zero.
+    `LeastMargin` is the first criterion of every workspace, by default with a reserve of zero.
 
     Attributes:
         limit: Reserve [N], >= 0.
@@ -52,7 +52,7 @@ class LeastMargin(Criterion):
 
     @property
     def always(self) -> bool:
-        """True if the reserve is zero, because every workspace includes this criterion."""
+        """True if the reserve is zero. Every workspace includes the criterion without reserve."""
         return self.limit == 0.0
 
     def judge(self, given: Given) -> Judged:
@@ -69,19 +69,25 @@ class LeastMargin(Criterion):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MaximumSag(Criterion):
+class _OfTensions(Criterion):
+    """Base class of criteria with a positive limit that depend on the tensions."""
+
+    _limit_range = POSITIVE
+    needs_tensions = True
+    limit: float
+
+
+class MaximumSag(_OfTensions):
     """The sag of every cable below its chord is within a limit, under the middle load of the set.
 
     Attributes:
         limit: Largest allowed sag [m], > 0.
     """
 
+    __slots__ = ()
     title = "sag"
     unit = "m"
     sense = "≤"
-    _limit_range = POSITIVE
-    needs_tensions = True
-    limit: float
 
     def judge(self, given: Given) -> Judged:
         """Limit minus largest sag [m], and the cable with the largest sag."""
@@ -91,7 +97,7 @@ class MaximumSag(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionError(Criterion):
-    """The position error of a simpler cable model is within a limit.
+    """The position error that a simpler cable model causes is within a limit.
 
     The simpler model gives tensions and lengths for the middle load of the set. The actual pose is the equilibrium of
     the platform on exact cables with these lengths, as in `confirm`.
@@ -125,9 +131,8 @@ class PositionError(Criterion):
         return Judged(given.spread(self.limit - error))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LeastStiffness(Criterion):
-    """The stiffness against a force on the center of mass is above a limit, in any direction of the force.
+class LeastStiffness(_OfTensions):
+    """The stiffness against a force on the center of mass is above a limit, for any direction of the force.
 
     The value is the stiffness in the softest direction, at fixed lengths, for a platform that can rotate. The value is
     0 if the equilibrium is not stable. The load is the middle load of the set.
@@ -136,21 +141,18 @@ class LeastStiffness(Criterion):
         limit: Smallest allowed stiffness [N/m], > 0.
     """
 
+    __slots__ = ()
     title = "stiffness"
     unit = "N/m"
     sense = "≥"
-    _limit_range = POSITIVE
-    needs_tensions = True
-    limit: float
 
     def judge(self, given: Given) -> Judged:
         """Stiffness in the softest direction minus the limit [N/m]."""
-        found = _least_stiffness(given.robot.freedom, cable_slopes(given.state).matrix)
+        found = least_stiffness(given.robot.freedom, cable_slopes(given.state).matrix)
         return Judged(given.spread(found - self.limit))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LeastFrequency(Criterion):
+class LeastFrequency(_OfTensions):
     """The lowest natural frequency of the platform on massless cables is above a limit; see `modes`.
 
     The load is the middle load of the set. The frequency is 0 Hz if the equilibrium is not stable.
@@ -159,12 +161,10 @@ class LeastFrequency(Criterion):
         limit: Smallest allowed natural frequency [Hz], > 0.
     """
 
+    __slots__ = ()
     title = "frequency"
     unit = "Hz"
     sense = "≥"
-    _limit_range = POSITIVE
-    needs_tensions = True
-    limit: float
 
     def judge(self, given: Given) -> Judged:
         """Lowest natural frequency minus the limit [Hz]."""
@@ -174,7 +174,7 @@ class LeastFrequency(Criterion):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Clearance(Criterion):
+class Clearance(_OfTensions):
     """The distances between cables, platform and obstacles are above a limit.
 
     The cables have the shapes under the middle load of the set. The pairs of bodies are the same as in
@@ -188,9 +188,6 @@ class Clearance(Criterion):
     title = "clearance"
     unit = "m"
     sense = "≥"
-    _limit_range = POSITIVE
-    needs_tensions = True
-    limit: float
     obstacles: Obstacle | Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
@@ -216,16 +213,16 @@ class Clearance(Criterion):
         return Judged(given.spread(value - self.limit), given.spread(cables[pair], -1))
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
-        """True for each box in which, at every position, an obstacle is nearer than the limit."""
+        """True for each box of positions in which an obstacle is always nearer than the limit."""
         return np.asarray(_clearance_rows(robot, self.obstacles).of_platform(pose, half) < self.limit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InFrame(Criterion):
-    """The platform's box and anchors keep a distance from the faces of the frame.
+    """The platform's box and anchors keep a minimum distance from the faces of the frame.
 
-    The frame is the box of the robot's frame_size. Without frame_size, it is the box around its anchors and the floor.
-    For a planar robot, only distances along its plane count.
+    The frame is the box of the robot's frame_size. Without frame_size, the frame is the box around the frame anchors
+    and the floor. For a planar robot, only distances along its plane count.
 
     Attributes:
         limit: Smallest allowed distance from the faces [m], >= 0.
@@ -250,7 +247,7 @@ class InFrame(Criterion):
         return Judged(locked(distance - self.limit))
 
     def scale(self, robot: Robot) -> float:
-        """A tenth of the frame's shortest edge of nonzero length [m]."""
+        """A tenth of the shortest edge of the frame that is not zero [m]."""
         low, high = bounds(robot)
         edges = (high - low)[high > low]
         return 0.1 * float(edges.min(initial=np.inf)) if edges.size else 1.0
@@ -258,29 +255,10 @@ class InFrame(Criterion):
 
 @lru_cache(maxsize=4)
 def _clearance_rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
-    """Function that measures clearances of `robot` and `obstacles`. Its data are prepared once for all poses."""
+    """Function that measures clearances of `robot` and `obstacles`, with data that are prepared once for all poses."""
     return ClearanceRows(robot, check_obstacles(obstacles, robot), precision=_PRECISION)
 
 
 def _cable_of(pair: tuple[str, str]) -> int:
     """First cable of a pair of bodies, from their names; -1 if neither body is a cable."""
     return next((int(found[1]) for name in pair if (found := _CABLE.fullmatch(name))), -1)
-
-
-def _least_stiffness(freedom: Array, matrix: Array) -> Array:
-    """Stiffness against a force on the center of mass, in the softest direction [N/m], (N,); 0 if unstable.
-
-    Arguments: `freedom`, free motions (n, 6); `matrix`, stiffnesses of the platform in world axes (N, 6, 6), or NaN.
-    """
-    lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
-    own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T
-    own = 0.5 * (own + np.swapaxes(own, 1, 2))
-    size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
-    size[size == 0.0] = 1.0
-    balanced = own / (size[:, :, None] * size[:, None, :])  # scaled so that forces and moments are comparable
-    stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
-    compliance = compliance_of(freedom, matrix)[:, :3, :3]
-    known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))
-    given = np.where(known[:, None, None], compliance, np.eye(3))
-    largest = np.linalg.eigvalsh(0.5 * (given + np.swapaxes(given, 1, 2)))[:, -1]
-    return np.where(lost, np.nan, np.where(known, 1.0 / largest, 0.0))

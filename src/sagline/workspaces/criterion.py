@@ -19,11 +19,12 @@ from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest, PolygonWalk
 
-POSITIVE: Final = MappingProxyType({"above": 0.0})  # ranges of limits
+POSITIVE: Final = MappingProxyType({"above": 0.0})  # allowed ranges of the limits of criteria
 NOT_NEGATIVE: Final = MappingProxyType({"low": 0.0})
 CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centroid, ClosedForm"
 
@@ -32,8 +33,8 @@ CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centr
 class Given:
     """N poses of a robot at which criteria are evaluated.
 
-    Tensions are computed when they are first needed, for the K poses with a nonnegative margin. They balance the middle
-    wrench of the wrench set.
+    Tensions balance the middle wrench of the wrench set. Tensions are computed when they are first needed, for the K
+    poses with a nonnegative margin.
 
     Attributes:
         robot: The robot.
@@ -59,8 +60,12 @@ class Given:
 
     @cached_property
     def pose(self) -> Pose:
-        """The poses, a batch of N."""
-        return Pose._adopt(self.rows[:, :3], self.rows[:, 3:])
+        """The poses, a batch of N. An underconstrained platform has its rotation from the balance at the K poses."""
+        rotation = self.rows[:, 3:]
+        if is_underconstrained(self.robot):
+            rotation = rotation.copy()
+            rotation[self.held] = self.state.pose.quaternion
+        return Pose._adopt(self.rows[:, :3], locked(rotation))
 
     @cached_property
     def held(self) -> Flags:
@@ -74,7 +79,8 @@ class Given:
 
     def planned(self, model: CableModel) -> Plan:
         """Tensions and lengths of another cable model at the K poses."""
-        return inverse(self.robot, self.pose[self.held], model, self.tension, self.wrench)
+        start = Pose._adopt(self.rows[self.held, :3], self.rows[self.held, 3:])
+        return inverse(self.robot, start, model, self.tension, self.wrench)
 
     @property
     def state(self) -> Equilibrium:
@@ -82,7 +88,7 @@ class Given:
         return self.plan.state
 
     def spread(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
-        """Values (N,) at all poses from values (K,) at the K poses; `missing` at the other poses."""
+        """Values (N,) at all poses: `values` (K,) at the K poses, and `missing` at the other poses."""
         found = np.full(len(self), missing)
         found[self.held] = values
         return locked(found)
@@ -94,7 +100,7 @@ class Judged(NamedTuple):
     Attributes:
         value: Distance to the limit in the criterion's unit, shape (N,): >= 0 if the criterion is met, and NaN if
             the pose has no tensions.
-        cable: Limiting cable, -1 for none, shape (N,); None if no pose has a single limiting cable.
+        cable: Limiting cable, -1 for none, shape (N,). None if this criterion is not limited by single cables.
     """
 
     value: Array
@@ -120,7 +126,7 @@ class Criterion:
     _limit_range: ClassVar[Mapping[str, float]] = MappingProxyType({})
 
     def __post_init__(self) -> None:
-        """Check the limit; an instance of this abstract class is an error."""
+        """Check the limit. An instance of the abstract class `Criterion` itself is an error."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
             raise InvalidValueError("Criterion()", "the abstract base class", "a criterion", step)
@@ -140,7 +146,7 @@ class Criterion:
         raise NotImplementedError
 
     def scale(self, robot: Robot) -> float:
-        """Scale by which values are divided to make different criteria comparable. The default is the limit.
+        """Scale that makes different criteria comparable: their values are divided by it. The default is the limit.
 
         Args:
             robot: The robot.
@@ -178,7 +184,7 @@ class Criterion:
 
     @property
     def always(self) -> bool:
-        """True if every workspace includes the criterion; reports then omit it."""
+        """True if every workspace includes the criterion, so that reports omit it."""
         return False
 
     def __str__(self) -> str:
@@ -199,7 +205,7 @@ class Criterion:
 
 
 def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> None:
-    """Reject `criteria` on tensions if tensions of `method` can jump, or if they depend on the previous pose."""
+    """Reject criteria that need tensions if the tensions of `method` can jump or depend on the previous pose."""
     jumps = not method.continuous or (isinstance(method, PolygonWalk) and method.optimum == "1-norm")
     first = next((one for one in criteria if one.needs_tensions), None)
     if first is None or not (jumps or isinstance(method, Closest)):

@@ -1,4 +1,4 @@
-"""Grid of a function of positions: values, refinement and net; and sign changes of the function along lines.
+"""Grid of a function of positions with values, refinement and net, and sign changes of the function along lines.
 
 The method of marching cubes gives the net, which depends only on the signs at the nodes. The position of a vertex on
 its edge is computed afterwards with the exact function. Two inside nodes are connected if they share an edge of the
@@ -24,7 +24,7 @@ Level = Callable[[Array], Array]
 Mask = NDArray[np.bool_]
 
 _CELL = tuple(product((0, 1), repeat=3))  # the corners of a cell
-_HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the nodes of a cell whose edges have been halved
+_HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the 27 nodes of a cell after its edges have been halved
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -83,7 +83,7 @@ def level_values(level: Level, positions: Array) -> Array:
 
 
 def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, int]) -> Grid:
-    """Values of `level` at all nodes of a grid of `cells` in a box; `low`, `high`: corners of the box (3,) [m]."""
+    """Values of `level` at all nodes of a grid of `cells` in a box. `low`, `high`: corners of the box (3,) [m]."""
     axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     shape = tuple(n + 1 for n in cells)
@@ -91,7 +91,7 @@ def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, in
 
 
 def refine_grid(grid: Grid, level: Level) -> Grid:
-    """Grid with half the step of `grid`, evaluated only in cells that the boundary crosses on the old or new grid."""
+    """Grid with half the step of `grid`, evaluated only in cells that the boundary crosses on either grid."""
     axes = [np.interp(np.arange(2 * len(a) - 1) / 2.0, np.arange(len(a)), a) for a in grid.axes]
     nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
     fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
@@ -111,13 +111,13 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
 
 
 def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
-    """Mask of the cells with nodes inside and nodes outside; the boundary crosses them."""
+    """Mask of the cells that the boundary crosses: they have nodes inside and nodes outside."""
     parts = list(_views(inside, nodes, stride))
     return np.asarray(np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts))
 
 
 def _views(nodes: Mask, offsets: tuple[tuple[int, ...], ...], stride: int) -> list[Mask]:
-    """Eight views of the mask `nodes`, one for each corner of a cell: the values at this corner of all cells."""
+    """Eight views of the mask `nodes`, one per cell corner. Each contains the values of all cells at this corner."""
     count = [(n - 1) // stride for n in nodes.shape]
     return [
         nodes[tuple(slice(a, a + stride * (n - 1) + 1, stride) for a, n in zip(offset, count, strict=True))]
@@ -132,13 +132,13 @@ def _grid(axes: list[Array], values: Array, evaluated: Mask, *, lock: bool = Tru
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """Triangles whose vertices are on edges of the grid, or at nodes on the border of the grid.
+    """Net of triangles, with vertices on edges of the grid, or at nodes on the border of the grid.
 
     Attributes:
         inner: For each vertex, the inside node of its edge, shape (V, 3).
         outer: For each vertex, the outside node of its edge, shape (V, 3); equal to `inner` at the border.
         faces: Vertices of each triangle, counterclockwise as seen from outside, shape (F, 3).
-        first: Index of each vertex before merging, shape (V,).
+        first: Index that each vertex had before equal vertices were merged, shape (V,).
     """
 
     inner: Indices
@@ -157,7 +157,7 @@ def triangulate(inside: Mask) -> Net:
     except ModuleNotFoundError:
         raise FileError.not_installed("scikit-image", "Workspaces need it", "workspace") from None
     padded = np.pad(np.where(inside, np.float32(1.0), np.float32(-1.0)), 1, constant_values=-1.0)
-    # the older method of the package uses only signs, and puts all vertices on edges
+    # this older method of the package uses only signs, and places all vertices on edges
     middle, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         padded, 0.0, method="lorensen", gradient_direction="ascent"
     )
@@ -179,7 +179,7 @@ def merge_vertices(inner: Indices, outer: Indices, faces: Indices, shape: tuple[
     return Net(inner[first], outer[first], faces, first)
 
 
-TRIAL = 3  # number of steps of regula falsi, in which the width of a bracket must decrease to an eighth
+TRIAL = 3  # after this number of steps of regula falsi, a bracket must have an eighth of its width
 ITERATIONS = 100  # largest number of steps; bisection at a jump needs about 45, a continuous function 5 to 8
 
 
@@ -209,7 +209,7 @@ class Brackets(NamedTuple):
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Search along rays from `points` (N, 3) [m], outward from inside points, otherwise inward. Each step triples."""
+    """Search along rays from `points` (N, 3) [m]: outward from inside points, inward from others. Each step triples."""
     is_inside = at_points >= 0.0
     limit = np.where(is_inside, outer_limit, inner_limit)
     away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
@@ -230,7 +230,7 @@ def brackets(
 
 
 def crossings(level: Level, inner: Array, outer: Array, at_inner: Array, at_outer: Array, **limits: float) -> Array:
-    """As `crossings_of`, with one function for all V lines."""
+    """Same as `crossings_of`, but with one function `level` for all V lines."""
     return crossings_of(lambda _, positions: level_values(level, positions), inner, outer, at_inner, at_outer, **limits)
 
 
@@ -244,12 +244,12 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Inside shares (V,) of V lines, by regula falsi. The weight of an end is reduced while the end does not move.
+    """Share (V,) of each line that is inside, by regula falsi. The weight of an end that does not move is reduced.
 
     `values` has two arguments, indices of lines and one position on each line, and returns the function of each line. A
-    bracket is bisected if an end value is infinite. It is bisected several times if regula falsi is slower than
-    bisection, for example at jumps. `precision` is relative to the smaller end value, `narrow` to the length of the
-    line. The weights follow Anderson & Björck 1973; the Illinois method would have weights of 1/2.
+    bracket is bisected if an end value is infinite. A bracket is bisected several times if regula falsi is slower than
+    bisection, for example at jumps. `precision` is relative to the smaller end value. `narrow` is relative to the
+    length of the line. The weights follow Anderson & Björck 1973; the Illinois method would have weights of 1/2.
     """
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()
@@ -282,10 +282,10 @@ def crossings_of(
 
 
 class _BisectionSchedule:
-    """Number of bisection steps of each bracket; it doubles after each trial in which regula falsi was slow."""
+    """Number of bisection steps of each bracket. The number doubles after each trial in which regula falsi was slow."""
 
     def __init__(self, count: int) -> None:
-        self._width = np.ones(count)  # width of the bracket at the start of a trial
+        self._width = np.ones(count)  # width of the bracket at the start of its trial
         self._steps, self._due = np.zeros((2, count), dtype=np.int64)
         self._next = np.ones(count, dtype=np.int64)
 

@@ -1,4 +1,4 @@
-"""Signed feasibility function of the position, its values in a plane, and the pose that is nearest to feasibility."""
+"""Level (signed feasibility) as a function of the position, values in a plane, and pose nearest to feasibility."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ from sagline.kernels import codes
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
+from sagline.workspaces.balanced import BalancedMargins
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, Given
 from sagline.workspaces.grid import Grid
@@ -27,7 +29,7 @@ from sagline.workspaces.region import AXES, Orientations
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
 Hull = Literal["exact", "inner", "outer"]
-BLOCK: Final = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
+BLOCK: Final = 1 << 12  # poses per block; a block takes about 0.1 s, and interrupts are handled between blocks
 
 
 class Details(NamedTuple):
@@ -39,8 +41,8 @@ class Details(NamedTuple):
         criterion: Index of the limiting criterion, shape (N,).
         cable: Limiting cable, -1 for none, shape (N,).
         rotation: Index of the limiting rotation, shape (N,).
-        uncertainty: Error bound of the level, shape (N,). It is 0 if the sign of the level is certain, or if the margin
-            is not the limiting criterion.
+        uncertainty: Error bound of the level, shape (N,). The bound is 0 if the sign of the level is certain or another
+            criterion than the margin is limiting.
     """
 
     level: Array
@@ -55,8 +57,8 @@ class Details(NamedTuple):
 class Levels:
     """Level function: the smallest value of all criteria, each divided by its scale, at a position; >= 0 inside.
 
-    If the margin is negative, criteria on tensions are ignored, because there are no tensions. The level at a position
-    is the smallest level of all rotations, or the largest level if one feasible rotation is sufficient.
+    If the margin is negative, no tensions exist, and criteria on tensions are ignored. The level at a position is the
+    smallest level of all rotations, or the largest level if one feasible rotation is sufficient.
 
     Attributes:
         robot: The robot.
@@ -66,7 +68,7 @@ class Levels:
         model: Cable model.
         tension: Tension distribution method.
         moment_arm: Lever arm as in `margin` [m].
-        held: For a planar workspace, the normal axis and the coordinate of its plane [m]; otherwise None.
+        held: For a planar workspace, the normal axis and the coordinate of its plane [m]. Otherwise None.
         on_block: Function that is called after each block with the number of poses in the block.
         hull: Margin to use: "exact" for its value, "inner" for its lower bound, "outer" for its upper bound.
         middle: Middle of the wrench set, shape (6,); the tensions balance this wrench.
@@ -86,7 +88,7 @@ class Levels:
     def __post_init__(self) -> None:
         """Prepare the margin."""
         self.middle = middle_wrench(self.wrenches)
-        self._margins = MarginRows(self.robot, self.wrenches, self.model, self.moment_arm)
+        self._margins = self._margins_under(self.wrenches)
         self._scales = [one.scale(self.robot) for one in self.criteria]
 
     def __call__(self, positions: Array) -> Array:
@@ -117,9 +119,15 @@ class Levels:
         return flat
 
     def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
-        """Margins (N,) [N] of `wrenches` at `positions` (N, 3) [m]; `rotation`: indices of the rotations, (N,)."""
+        """Margins (N,) [N] of `wrenches` at `positions` (N, 3) [m]. `rotation`: indices of the rotations, (N,)."""
         rows = np.hstack((self.in_plane(positions), self.orientations.quaternion[rotation]))
-        return MarginRows(self.robot, wrenches, self.model, self.moment_arm).rows(rows).value
+        return self._margins_under(wrenches).rows(rows).value
+
+    def _margins_under(self, wrenches: WrenchSet) -> MarginRows | BalancedMargins:
+        """Margins of a wrench set as a function of pose rows."""
+        if is_underconstrained(self.robot):
+            return BalancedMargins(self.robot, wrenches, self.model)
+        return MarginRows(self.robot, wrenches, self.model, self.moment_arm)
 
     def _block(self, positions: Array) -> Details:
         found = self._in_rotation(positions, 0)
@@ -142,11 +150,11 @@ class Levels:
             if one.needs_tensions and not given.held.any():
                 continue
             judged = one.judge(given)
-            # If tensions exist but the tension method does not find them, the pose counts as outside. At other poses
+            # If tensions exist, but the tension method does not find them, the pose counts as outside. At other poses
             # without tensions, the margin decides.
             lost = np.isnan(judged.value) & (bracket.low >= 0.0)
             value = np.where(lost, -np.inf, judged.value / scale)
-            least = value < level  # False for NaN
+            least = value < level  # the comparison is False for NaN
             level[least], criterion[least] = value[least], index
             cable[least] = -1 if judged.cable is None else judged.cable[least]
         uncertainty = np.where(criterion == 0, self._uncertainty(bracket), 0.0)
@@ -224,7 +232,7 @@ class Slice:
 
 
 def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int, int]) -> Slice:
-    """Slice through `find`, a function of positions such as `Levels.details`; `low`, `high`: box corners (3,) [m]."""
+    """Slice through `find`, a function of positions such as `Levels.details`. `low`, `high`: box corners (3,) [m]."""
     first, second = plane.axes
     across, up = np.linspace(low[first], high[first], shape[0]), np.linspace(low[second], high[second], shape[1])
     found = find(plane.positions(across, up))
@@ -234,18 +242,18 @@ def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int
 
 
 def middle_wrench(wrenches: WrenchSet) -> Array:
-    """Middle of a wrench set: force [N], moment [N m], shape (6,). For a polytope, it is the mean of the corners."""
+    """Middle of a wrench set: force [N], moment [N m], shape (6,). For a polytope, the mean of its corners."""
     ends = np.cumsum(wrenches.sizes)
     means = [wrenches.corners[end - size : end].mean(axis=0) for end, size in zip(ends, wrenches.sizes, strict=True)]
     return locked(wrenches.center + sum(means, start=np.zeros(6)))
 
 
-_STARTS: Final = 3  # number of best grid points from which the search starts
+_STARTS: Final = 3  # the search starts from this number of best grid points
 _STEP: Final = 0.1  # initial step, as a share of the box
 _EVALUATIONS: Final = 300  # largest number of evaluations from each start
 _PRECISION: Final = 1e-4  # precision of the position [m]
-_FAR: Final = 1e6  # finite value that replaces an infinite level in the search
-_UNHELD: Final = 1e3  # reduction of the merit at infeasible poses, if criteria need tensions
+_FAR: Final = 1e6  # an infinite level is replaced by this finite value in the search
+_UNHELD: Final = 1e3  # amount by which the merit of infeasible poses is reduced if criteria need tensions
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -274,7 +282,7 @@ class Nearest(Result):
 
 
 def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
-    """Pose with the largest level, by simplex searches from the best nodes of `grid`; `low`, `high`: corners [m]."""
+    """Pose with the largest level, by simplex searches from the best nodes of `grid`. `low`, `high`: corners [m]."""
     nodes = np.stack(np.unravel_index(np.arange(grid.values.size), grid.values.shape), axis=1)
     positions = np.clip(grid.positions(nodes), low, high)
     values = _merit(levels, positions)
@@ -293,9 +301,9 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of `positions`: the level, or, for infeasible loads, a value computed from the feasible fraction.
+    """Finite merit of `positions`: the level, or a value from the feasible fraction if the loads are infeasible.
 
-    Margins alone would lead to singular poses, where all margins have a small absolute value.
+    With the margin as merit, the search would end at singular poses, where all margins are small.
     """
     found = levels.details(positions)
     bare = levels.margins_of(NO_LOAD, positions, found.rotation)
@@ -308,13 +316,13 @@ def _merit(levels: Levels, positions: Array) -> Array:
 
 
 def _share(bare: Array, margin: Array) -> Array:
-    """Lower bound of the feasible fraction of the load. It is a bound because margins are concave in the load."""
+    """Lower bound of the feasible fraction of the load. The bound holds because margins are concave in the load."""
     return np.asarray(bare / (bare - margin))
 
 
 def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Position of a local maximum of the merit, found by a simplex search from `start`, and the merit there."""
-    from scipy.optimize import minimize  # the import takes a quarter of a second
+    from scipy.optimize import minimize  # this import takes a quarter of a second
 
     free = np.flatnonzero(high > low)
     step = _STEP * (high - low)[free]
@@ -349,6 +357,11 @@ def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ..
             return own, f"{at} {type(levels.tension).__name__} finds no tensions for {criterion.title}: {how.text}"
         short = -float(details.level[0]) * criterion.scale(levels.robot)
         return own, f"{at} the {criterion.title} fails by {n(short, '.3g', criterion.unit)}{_of(own)}"
+    if is_underconstrained(levels.robot) and np.isinf(margin):
+        cables, why = BalancedMargins(levels.robot, levels.wrenches, levels.model).reason(pose)
+        return cables, f"{at}{_of(cables)}: {why}"
+    if is_underconstrained(levels.robot):
+        return own, f"{at} a tension of the equilibrium is outside its limits by {n(-margin, '.3g', 'N')}{_of(own)}"
     if np.isinf(margin):
         return own, f"{at}, as in the whole box, the platform is singular, or a cable has no length"
     if criterion.title != "margin":

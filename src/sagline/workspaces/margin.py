@@ -21,7 +21,7 @@ from sagline.core.results import Result, Status
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import codes, tables
 from sagline.kernels.memory import memory_for
-from sagline.kernels.workspaces.signed_margin import FACET_SIZE, signed_margins
+from sagline.kernels.workspaces.signed_margin import margin_memory, signed_margins
 from sagline.kernels.workspaces.wrench_set import SetTerms
 from sagline.robot.batch import Robots, first_of, one_a_pose, robot_fields, together
 from sagline.robot.pose import Pose, PoseLike, pose_of
@@ -31,12 +31,12 @@ from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import LIMITS_OF
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet, load_of
 
-BLOCK = 1 << 13  # poses per block, about 0.1 s; interrupts are handled between blocks
+BLOCK = 1 << 13  # poses per block; a block takes about 0.1 s, and interrupts are handled between blocks
 _CATENARY = Catenary()
 
 
 class Bracket(NamedTuple):
-    """Margins of N poses. `Margin` has the same fields, the robot and the poses.
+    """Margins of N poses with their bounds. `Margin` has the same fields, and also the robot and the poses.
 
     Attributes:
         value: Continuous margin between `low` and `high` [N], (N,).
@@ -72,7 +72,7 @@ class MarginRows:
         moment_arm: float | None = None,
         cables: Array | None = None,
     ) -> None:
-        """Prepare one robot or R robots; `moment_arm` [m] has the meaning that it has in `margin`.
+        """Prepare one robot or R robots. `moment_arm` [m]: as in `margin`.
 
         If `cables` (R, m, CABLE_COLUMNS) is given, the R robots are copies of `robot` with these tables of cables.
         """
@@ -102,7 +102,7 @@ class MarginRows:
         )
 
     def about(self, wrench: Array) -> MarginRows:
-        """Margins for the wrench set plus an unchecked wrench [N, N m], (6,); all other data are shared."""
+        """`MarginRows` for the wrench set shifted by `wrench` [N, N m], (6,), which is not checked."""
         model, limits, terms, loads, arms = self._given
         moved = object.__new__(MarginRows)
         moved.cable_count, moved.robot_count = self.cable_count, self.robot_count
@@ -110,7 +110,7 @@ class MarginRows:
         return moved
 
     def rows(self, poses: NDArray[np.float64], progress: Progress | None = None) -> Bracket:
-        """Margins at the unchecked rows `poses` (N, 7), N/R rows per robot. A row with NaN has the status NO_CHORD."""
+        """Margins at the rows `poses` (N, 7), N/R per robot, without checks. Rows with NaN get the status NO_CHORD."""
         rows = np.ascontiguousarray(poses, dtype=np.float64).view()
         count = len(rows)
         if count % self.robot_count:
@@ -118,7 +118,7 @@ class MarginRows:
             raise InvalidValueError("poses", f"{count} of them", f"a multiple of {self.robot_count}", step)
         numbers, counters = memory_for(self.cable_count)
         memory = (
-            np.empty(2 * numbers.size + FACET_SIZE),
+            np.empty(2 * numbers.size + margin_memory(len(self._given[2][0]), self.cable_count)),
             np.empty(2 * counters.size, dtype=np.int64),
             np.empty(self.cable_count, dtype=np.int8),
         )
@@ -139,21 +139,21 @@ class MarginRows:
 
 
 def mean_arms(table: Array, bodies: Array) -> Array:
-    """Mean distance (R,) [m] between platform anchors and center of mass; `table`: cables, `bodies`: bodies."""
+    """Mean distance (R,) [m] of platform anchors from center of mass. `table`: cable_table. `bodies`: body_table."""
     anchors = table[:, :, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
     centers = bodies[:, None, tables.CENTER_X : tables.CENTER_Z + 1]
     return np.asarray(np.linalg.norm(anchors - centers, axis=-1).mean(axis=-1))
 
 
 def _arms(table: Array, bodies: Array, moment_arm: float | None) -> tuple[Array, Array]:
-    """Lever arms of the norm [m], and positive lever arms by which moments are divided [m]."""
+    """Lever arms of the norm [m] (0 allowed), and positive lever arms [m] by which moments are divided."""
     means = mean_arms(table, bodies)
     own = means if moment_arm is None else np.array([number(moment_arm, "moment_arm", "m", low=0.0)])
     return locked(own), locked(np.where(means > 0.0, means, 1.0))
 
 
 def _set_terms(wrenches: WrenchSet, inertias: Array) -> SetTerms:
-    """Wrench set in the form that the kernel needs: segments along a single axis become a box."""
+    """Wrench set in the form for the kernel: all segments along a single axis become one box."""
     segments = np.abs(wrenches.segments)
     straight = np.count_nonzero(segments, axis=1) <= 1
     half = segments[straight].sum(axis=0)
@@ -209,15 +209,15 @@ class Margin(Result, Tabular):
         moment_arm: Lever arm that converts moments to forces [m]; None for each robot's mean lever arm.
         value: Largest additional load that can be balanced in every direction [N], shape () or (N,). A moment counts as
             a force at the lever arm. A negative value is minus the excess of the load. The value is infinite for
-            straight cables without limits. It is -infinite if the pose has no margin (see status), or if a cable has no
-            admissible tension. It is never NaN. It is continuous, except for small jumps where the exact shape of the
-            cables determines its sign.
-        low: Lower bound of the margin for all sag forces [N], with the shape of value. If the bound is nonnegative,
+            straight cables without limits. The value is -infinite if the pose has no margin (see status), or if a cable
+            has no admissible tension. The value is never NaN. The value is a continuous function of the pose, except
+            for small jumps where the exact shape of the cables determines its sign.
+        low: Lower bound of the margin for all sag forces [N], with the shape of value. If this bound is nonnegative,
             every load of the set is proved feasible. Without sag, both bounds are equal to the value.
         high: Upper bound of the margin [N]. If the bound is negative, at least one load is proved infeasible.
-        direction: Normal of the nearest facet, shape (..., 6): force part, and moment part [1/m], in world axes. Its
-            length is 1 if the moment part is multiplied by the lever arm. An additional load opposite to this direction
-            exceeds the limits first. If the force part is zero, this load is a pure moment.
+        direction: Normal of the nearest facet, shape (..., 6): force part, and moment part [1/m], in world axes. The
+            length of the vector is 1 if the moment part is multiplied by the lever arm. An additional load opposite to
+            `direction` exceeds the limits first. If the force part is zero, such a load is a pure moment.
         limiting_cable: Index of the cable whose tension limit has the largest effect on the value, -1 for none, with
             the shape of value.
         status: Codes of `MarginStatus`, with the shape of value.
@@ -261,7 +261,7 @@ class Margin(Result, Tabular):
 
 
 def _newtons(value: ArrayLike) -> str:
-    """Text of a margin, which may be infinite."""
+    """Text of a margin in newtons, finite or infinite."""
     number = float(np.asarray(value))
     return n(number, unit="N") if np.isfinite(number) else f"{number:g} N".replace("-", "−")
 

@@ -35,14 +35,14 @@ class ProofVerdict(Status):
     PROVED_OUTSIDE = OUTSIDE, "at every position, at least one load cannot be balanced by tensions within the limits"
 
 
-BLOCK: Final = 1 << 11  # boxes per block, about 0.03 s; interrupts are handled between blocks
+BLOCK: Final = 1 << 11  # boxes per block; a block takes about 0.03 s, and interrupts are handled between blocks
 MOST_CELLS: Final = 4_000_000  # largest number of cells that wait for a proof; they take 100 MB
 OBLONG: Final = 0.6  # an edge is halved if it is longer than this share of the longest edge
 PARTS: Final = (1, 4, 8, 16)  # possible numbers of parts of an edge
 PRECISION: Final = (
     1.0,
     1e-12,
-)  # weight of the nonlinear terms, and the relative rounding error of a sum of a thousand terms
+)  # weight of the nonlinear terms, and relative rounding error of a sum of a thousand terms
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -61,7 +61,7 @@ class Cells(Result):
 
 
 class Prover:
-    """Proofs for rows of boxes; data that do not depend on the boxes are prepared once.
+    """Proofs for rows of boxes. Data that do not depend on the boxes are prepared once.
 
     Attributes:
         size: Approximate mean length of a chord [m].
@@ -78,7 +78,7 @@ class Prover:
         precision: tuple[float, float] = PRECISION,
         progress: Progress | None = None,
     ) -> None:
-        """Prepare the proofs for a robot without pulleys; `precision` is for tests."""
+        """Prepare the proofs for a robot without pulleys. `precision` exists only for tests."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
         self._given = (
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
@@ -122,7 +122,7 @@ class Prover:
 
 
 def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
-    """Divide `box` breadth-first until all cells are proved or have the edge `smallest` [m], or the time is over."""
+    """Divide `box` breadth-first until all cells are proved or have the edge `smallest` [m], or until the deadline."""
     half = 0.5 * (box.high - box.low)
     waiting = (box.low + half)[None]
     done: list[tuple[Array, Array, Codes]] = []
@@ -145,11 +145,11 @@ def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
 def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
     """Verdicts of cells of positions, for level poses or for all tilts up to `tilt`.
 
-    Tilts are rotation vectors in a ball, which cubes cover. For a planar robot, tilts are rotations about the normal of
-    its plane, and intervals cover their range. The angle between two rotations of a cube is at most the length of the
-    difference of their rotation vectors. A cell is outside if one orientation is infeasible, and inside if all
+    Tilts are rotation vectors in a ball. Cubes cover the ball. For a planar robot, tilts are rotations about the normal
+    of its plane, and intervals cover their range. The angle between two rotations of a cube is at most the length of
+    the difference of their rotation vectors. A cell is outside if one orientation is infeasible, and inside if all
     orientations are feasible. Within a cell, the directions of the cables vary by an angle of about the cell's size
-    divided by the length of a chord. Cubes are divided until they are smaller than this angle.
+    divided by the length of a chord. Cubes are divided until they are smaller than the angle of this variation.
     """
     if tilt == 0.0:
         return prover.verdicts(middle, half)
@@ -177,7 +177,7 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
 
 
 def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
-    """Parts of each cube that intersect the ball of tilts, and the cells to which these parts belong."""
+    """Parts of each cube that intersect the ball of tilts, and for each part the cell to which it belongs."""
     count = more // parts
     steps = (2.0 * np.arange(count) + 1.0 - count) / more
     places = np.stack(np.meshgrid(*[steps] * len(edges), indexing="ij"), axis=-1).reshape(-1, len(edges))
@@ -188,7 +188,7 @@ def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, mor
 
 
 def _children(half: Array) -> tuple[Array, Array]:
-    """Centers of a box's parts relative to its center, and half edges of the parts; all long edges are bisected."""
+    """Centers of the parts of a box relative to its center, and half edges of the parts. Long edges are bisected."""
     long = (half >= OBLONG * half.max()) & (half > 0.0)
     halved = np.where(long, 0.5 * half, half)
     steps = [np.array([-1.0, 1.0]) * halved[k] if long[k] else np.zeros(1) for k in range(3)]
@@ -248,17 +248,17 @@ class Proof(Result):
 
     @property
     def volume(self) -> float:
-        """Volume of the whole box of positions [m^3], to which the shares refer; zero for a flat box."""
+        """Volume of the whole box of positions [m^3]. The shares refer to this volume, which is zero for a flat box."""
         return float(np.prod(self.box.high - self.box.low))
 
     @property
     def inside_volume(self) -> float:
-        """Volume that is proved inside [m^3]; it is a lower bound of the workspace's volume in the box."""
+        """Volume that is proved inside [m^3]: a lower bound of the volume of the workspace in the box."""
         return self.inside * self.volume
 
     @property
     def outside_volume(self) -> float:
-        """Volume that is proved outside [m^3]; the workspace's volume in the box is at most the rest of the box."""
+        """Volume that is proved outside [m^3]. The workspace in the box is at most the rest of the box."""
         return self.outside * self.volume
 
     @property
@@ -283,7 +283,7 @@ def prove(
     smallest: float | None = None,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove that every pose of a box is feasible, or that no pose is feasible; or prove this for cells of the box.
+    """Prove that every pose of a box is feasible, or that no pose is, for the whole box or for its cells.
 
     Without a tilt of the box, poses are level. With a tilt, the orientations of a position are all rotations by at most
     this angle about any axis (for a planar platform, about the normal of its plane). A position is inside if all its
@@ -297,8 +297,8 @@ def prove(
         wrenches: Set of loads; the cables must balance all of them. None for the weight alone.
         budget: Time limit for the proofs [s], > 0.
         model: Cable model.
-        smallest: Smallest length of a cell's longest edge [m]. A division into smaller cells is not made. None: only
-            the budget is a limit.
+        smallest: Smallest length of a cell's longest edge [m]. Smaller cells are not made. None: only the budget is a
+            limit.
         progress: Function that is called from time to time with the number of finished cells and of known cells.
 
     Returns:
@@ -329,7 +329,7 @@ def prove(
     least = 0.0 if smallest is None else number(smallest, "smallest", "m", above=0.0)
     report = callback(progress, "progress")
     model = model_of(model)
-    # the time to load or compile the kernel does not count
+    # the budget does not include the time to load or compile the kernel
     Prover(robot, load, model).verdicts(box.low[None], np.zeros(3))
     prover = Prover(robot, load, model, progress=report)
     prover.deadline = time.monotonic() + seconds
@@ -344,7 +344,7 @@ def prove(
 
 
 def check_provable(robot: Robot) -> None:
-    """Reject robots with pulleys or with fewer cables than degrees of freedom, for which no proofs are implemented."""
+    """Reject robots with pulleys or with fewer cables than degrees of freedom, because they have no proofs."""
     check_cable_count(robot)
     if robot.winches is not None and (robot.winches.pulley_radius > 0.0).any():
         cable = int(np.argmax(robot.winches.pulley_radius > 0.0))

@@ -4,41 +4,34 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import brief, choice
+from sagline.core.arguments import brief, choice, optional
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.core.results import set_fields
 from sagline.robot.checks import PLANAR, ROTATING
-from sagline.robot.pose import Pose
-from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, turn_in_words
+from sagline.robot.pose import Pose, PoseBox
+from sagline.robot.reach import LEVEL, ROUNDING, bounds, forbidden_turn, turn_in_words
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-
-from typing import NamedTuple
-
-from sagline.core.arguments import optional
-from sagline.robot.pose import PoseBox
-from sagline.robot.reach import bounds
-
 Need = Literal["all", "any"]
 _NEEDS: Final = ("all", "any")
-_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # rotations of a planar platform, relative to the angle
+_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # sampled rotations of a planar platform, relative to the angle
 _CORNERS: Final = np.array([one for one in product((-1.0, 0.0, 1.0), repeat=3) if any(one)])
 _AXES: Final = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Orientations:
-    """Rotations of the platform; at a position, either all rotations or any one of them must be feasible.
+    """Rotations of the platform. At a position, all rotations or at least one rotation must be feasible.
 
     A continuous set of rotations is represented by the listed samples.
 
@@ -58,7 +51,7 @@ class Orientations:
             need: "all" or "any".
 
         Raises:
-            InvalidValueError: If a matrix is not a rotation, if no rotation is given, or if `need` is another word.
+            InvalidValueError: If a matrix is not a rotation. If no rotation is given. If `need` is another word.
 
         Examples:
             >>> import numpy as np
@@ -98,7 +91,7 @@ class Orientations:
         return Orientations._of, (self.quaternion, self.need)
 
     def at(self, positions: Array, index: int) -> Array:
-        """Rows of poses: the platform at positions, in one of the rotations.
+        """Pose rows: the platform at `positions`, in the rotation with the index `index`.
 
         Args:
             positions: Positions of the platform origin [m], shape (N, 3).
@@ -114,10 +107,10 @@ class Orientations:
 
 @dataclass(frozen=True, slots=True)
 class Tilts:
-    """All rotations by at most an angle, about any axis; all of them must be feasible at a position.
+    """All rotations by at most `angle` about any axis, which must all be feasible at a position.
 
-    The samples are the level orientation, and rotations by the full angle about 26 axes in all directions. For a planar
-    robot, the samples are rotations by the angle and by half the angle, in both directions.
+    The samples are the level orientation, and rotations by the full angle about 26 axes that cover all directions. For
+    a planar robot, the samples are rotations by the angle and by half the angle, in both directions.
 
     Attributes:
         angle: Largest angle of rotation [rad], 0 to pi.
@@ -157,7 +150,7 @@ class Tilts:
 
 
 def _level() -> Orientations:
-    """Level orientation alone."""
+    """Set that contains only the level orientation."""
     return Orientations._of(LEVEL[None].copy(), "all")
 
 
@@ -170,7 +163,7 @@ def check_tilt(robot: Robot, angle: float, item: str) -> None:
 
 
 def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
-    """Checked orientations for `robot`: `given`, the argument of `workspace`, or all rotations up to `tilt` [rad]."""
+    """Orientations for `robot`: the checked argument `given` of `workspace`, or all rotations up to `tilt` [rad]."""
     if given is not None and tilt > 0.0:
         step = "Give the tilt of the box, or orientations."
         value = f"given with a box of tilt {np.degrees(tilt):.4g} deg"
@@ -213,8 +206,8 @@ class Region(NamedTuple):
         low: Lowest corner of the region [m], shape (3,).
         high: Highest corner [m], above the lowest corner along every axis.
         flat: Index of the axis along which the box has no extent; None if it has an extent along all axes. With a flat
-            axis, the positions are in a plane, and the region has a thickness. Its volume divided by the thickness is
-            the area.
+            axis, the positions are in a plane, and the region has a thickness. The area is the volume of the region
+            divided by the thickness.
         thickness: Thickness of the region along the flat axis [m]; 1 without a flat axis.
         cells: Number of cells along each axis.
     """
@@ -269,13 +262,13 @@ def _own(robot: Robot) -> tuple[Array, Array]:
 
 
 def flat_axis(box: PoseBox) -> tuple[int, float] | None:
-    """First axis along which a box has no extent, and the box's coordinate on it [m]; None without such an axis."""
+    """First axis along which `box` has no extent, and the coordinate of the box on it [m]. None if none exists."""
     flat = np.flatnonzero(box.high - box.low <= ROUNDING)
     return (int(flat[0]), float(box.low[flat[0]])) if flat.size else None
 
 
 def _plane_axis(robot: Robot) -> int | None:
-    """Axis of the normal of a planar robot's plane; raises an error if the normal is not along an axis."""
+    """World axis along the normal of a planar robot's plane. Raises an error if the normal is not along an axis."""
     if robot.plane_normal is None:
         return None
     axis = int(np.argmax(np.abs(robot.plane_normal)))

@@ -20,7 +20,7 @@ from sagline.workspaces.levels import Levels
 from sagline.workspaces.proof import Prover, check_provable
 from sagline.workspaces.surface import Components
 
-PARTS: Final = (1, 2, 4)  # numbers of parts into which each edge of a cell is divided, in the order of trial
+PARTS: Final = (1, 2, 4)  # numbers of parts into which each edge of a cell is divided; they are tried in this order
 MOST_CELLS: Final = 1 << 25  # largest number of parts; they take 33 MB
 MOST_BOXES: Final = 60_000  # largest number of boxes; their proofs take about a second
 MOST_LAYERS: Final = 16  # largest number of layers of cells around a component
@@ -31,10 +31,10 @@ Exclude = Callable[[Array, Array], Flags]
 
 
 def separated(components: Components, exclude: Exclude | None) -> Flags:
-    """Mask (K,) of components: True if a closed layer of excluded boxes separates the component from all others.
+    """Mask (K,): True for a component that a closed layer of excluded boxes separates from all other components.
 
     A search starts at each component and continues outward until it meets excluded cells. The component is separated if
-    the search ends before it reaches another component. Otherwise the search is repeated with smaller cells.
+    the search ends before it reaches another component. If not, the search is repeated with smaller cells.
     """
     found = np.zeros(components.count, dtype=np.bool_)
     if exclude is not None:
@@ -45,7 +45,7 @@ def separated(components: Components, exclude: Exclude | None) -> Flags:
 
 
 class _Search:
-    """Searches that start at components. The limit on the number of boxes counts the boxes of all searches."""
+    """Searches that start at components. One limit applies to the number of boxes of all searches together."""
 
     def __init__(self, components: Components, exclude: Exclude) -> None:
         self._components, self._exclude = components, exclude
@@ -71,7 +71,7 @@ class _Search:
         return np.asarray(np.minimum(cells, parts * (np.array(self._components.nodes.shape) - 1) - 1))
 
     def _is_enclosed(self, one: int, parts: int) -> bool:
-        """As `separated`, with the edges of the cells divided into `parts` parts."""
+        """Same as `is_enclosed`, with the edges of the cells divided into `parts` parts."""
         own = self._components.nodes == one
         reached, other = _cells_at(own, parts), _cells_at((self._components.nodes >= 0) & ~own, parts)
         layer = _beside(np.argwhere(reached), reached)
@@ -93,7 +93,7 @@ class _Search:
 
 
 def _beside(cells: Indices, asked: Flags) -> Indices:
-    """Neighbors (K, 3) of `cells` across faces, edges and corners, without the cells of the mask `asked`."""
+    """Neighbors (K, 3) of `cells` across faces, edges and corners, except the cells in the mask `asked`."""
     near = (cells[:, None] + _AROUND).reshape(-1, 3)
     near = near[((near >= 0) & (near < asked.shape)).all(axis=1)]
     near = near[~asked[tuple(near.T)]]
@@ -101,7 +101,7 @@ def _beside(cells: Indices, asked: Flags) -> Indices:
 
 
 def _cells_at(nodes: Flags, parts: int) -> Flags:
-    """Mask of the parts of cells: True if a corner of the part is in the mask, or if all nodes of its cell are."""
+    """Mask of the parts of cells: True if a corner of the part is in `nodes`, or if all nodes of its cell are."""
     inner, at = nodes, np.zeros([parts * (count - 1) for count in nodes.shape], dtype=np.bool_)
     for axis in range(3):
         inner = np.asarray(np.logical_and(*(np.delete(inner, end, axis=axis) for end in (0, -1))))
@@ -114,7 +114,7 @@ def _cells_at(nodes: Flags, parts: int) -> Flags:
 
 
 def exclusion(levels: Levels) -> Exclude | None:
-    """Proofs that boxes are outside the workspace, by the margin and the criteria; None if no proof is implemented."""
+    """Function that proves boxes to be outside the workspace by margin and criteria; None if none is implemented."""
     turned, robot = levels.orientations, levels.robot
     vectors = Rotation.from_quat(turned.quaternion).as_rotvec()
     prover = _prover(levels) if not vectors.any() or levels.wrenches.accelerations[1] == 0.0 else None
@@ -140,7 +140,7 @@ def exclusion(levels: Levels) -> Exclude | None:
 
 
 def _prover(levels: Levels) -> Prover | None:
-    """Proofs by the margin; None if they are not implemented for the robot."""
+    """Prover that uses the margin; None if no proofs are implemented for the robot."""
     try:
         check_provable(levels.robot)
     except InvalidValueError:

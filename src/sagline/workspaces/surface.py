@@ -1,9 +1,9 @@
 """Closed surfaces of triangles, components of the set inside a surface, and walks between these components.
 
-A thin part of a set can be between the nodes of a grid; then the inside nodes form several components although the set
-is connected. Such a part is found by a path from one component to another, along the nodes with the highest values.
-Positions of the path that are outside the set are moved into it, across the path. The path is divided until all
-positions are in the set and close together.
+A thin part of a set can be between the nodes of a grid. The inside nodes then form several components although the set
+is connected. A path finds such a thin part: the path leads from one component to another, along the nodes with the
+highest values. Positions of the path that are outside the set are moved into it, across the path. The path is divided
+until all positions are in the set and close together.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from sagline.core.arrays import Array, Flags, Indices, checked, locked
+from sagline.core.arrays import Array, Flags, Indices, checked
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, formats
 from sagline.workspaces.grid import Grid, Level, level_values
@@ -26,7 +26,7 @@ from sagline.workspaces.grid import Grid, Level, level_values
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Surface(Result):
-    """A surface of triangles with corners that are counterclockwise as seen from outside.
+    """Surface of triangles, whose corners are counterclockwise as seen from outside.
 
     Attributes:
         vertices: Positions [m], shape (V, 3).
@@ -38,7 +38,7 @@ class Surface(Result):
 
     @property
     def volume(self) -> float:
-        """Enclosed volume [m^3], by the divergence theorem; cavities are subtracted."""
+        """Enclosed volume without cavities [m^3], by the divergence theorem."""
         return float(volumes_of(self.vertices, self.faces).sum())
 
     @property
@@ -84,7 +84,7 @@ def normals_of(vertices: Array, faces: Indices) -> Array:
 
 
 def volumes_of(vertices: Array, faces: Indices) -> Array:
-    """Contribution of each triangle to the enclosed volume, (F,) [m^3]: signed volume of a tetrahedron over it."""
+    """Contribution (F,) of each triangle to the enclosed volume [m^3]: the signed volume of a tetrahedron on it."""
     if not len(faces):
         return np.zeros(0)
     top = vertices.mean(axis=0)  # a reference point near the surface reduces rounding errors
@@ -95,14 +95,14 @@ _TOLD: Final = 8  # largest number of volumes that are printed
 
 
 def vertex_areas(vertices: Array, faces: Indices) -> Array:
-    """Share of each vertex in the surface's area, (V,) [m^2]: a third of the area of the triangles at the vertex."""
+    """Area of the surface that belongs to each vertex, (V,) [m^2]: a third of the triangles at the vertex."""
     areas = np.linalg.norm(normals_of(vertices, faces), axis=1) / 3.0
     return np.asarray(np.bincount(faces.ravel(), np.repeat(areas, 3), minlength=len(vertices)), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Components(Result):
-    """The components of a set in decreasing order of volume; a cavity belongs to the component around it.
+    """The components of a set in decreasing order of volume. A cavity belongs to the component around it.
 
     Attributes:
         volume: Volume of each component [m^3], shape (K,).
@@ -139,14 +139,14 @@ class Components(Result):
         return f"{counted(self.count, 'piece')}" + f", volume {sizes}{more}" * (self.count > 0)
 
     def label(self, position: ArrayLike) -> NDArray[np.int32]:
-        """Index of the component of positions, with the accuracy of a grid cell.
+        """Index of the component in which each position is, with the accuracy of a grid cell.
 
         Args:
             position: Positions [m], shape (..., 3), each in the set.
 
         Returns:
-            Index of the component, shape (...,). The nearest node of the cell that is in a component gives the index.
-            The index is -1 if no node of the cell is in a component.
+            Index of the component, shape (...,). The nearest node of the grid cell that is in a component gives this
+            index; -1 if no node of the cell is in a component.
 
         Raises:
             InvalidValueError: If the positions have another shape.
@@ -167,24 +167,7 @@ class Components(Result):
         return np.where(np.logical_or.reduce(beyond), -1, labels).astype(np.int32)
 
 
-def components_of(grid: Grid, nodes: NDArray[np.int32], inner: Indices, faces: Indices, volumes: Array) -> Components:
-    """Components of a set; their separation is not proved.
-
-    Arguments: `grid`; `nodes`, the labels of its nodes, 1 and higher in the set; `inner` and `faces`, the inner nodes
-        and the triangles of the set's net; `volumes` (F,) [m^3] of the triangles.
-    """
-    count = int(nodes.max())
-    vertices = nodes[tuple(inner.T)] - 1
-    volume = np.bincount(vertices[faces[:, 0]], volumes, minlength=count)
-    order = np.argsort(-volume, kind="stable")
-    rank = np.empty(count + 1, dtype=np.int32)
-    rank[order], rank[-1] = np.arange(count), -1  # label 0 (outside) becomes -1
-    labels = locked(np.ascontiguousarray(rank[nodes - 1]))
-    separate = locked(np.full(count, count == 1))
-    return Components(locked(volume[order]), locked(rank[vertices]), grid.x, grid.y, grid.z, labels, separate)
-
-
-FINE: Final = 32  # neighboring positions of a walk are closer than the cell's longest edge divided by this number
+FINE: Final = 32  # largest distance of neighboring positions of a walk: longest edge of a cell divided by this number
 MOST_WALKS: Final = 256  # largest number of components for which walks are searched
 _MOST_NODES: Final = 4096  # largest number of nodes that are examined
 _MOST_DIVISIONS: Final = 24  # largest number of divisions of a path; a successful walk takes 6 to 8
@@ -200,9 +183,9 @@ _Node = tuple[int, int, int]
 
 def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]:
     """Component label of each node (0 outside, 1 to count inside), the count, and the walks that were found."""
-    from scipy.ndimage import binary_erosion, label  # the import takes a fifth of a second
+    from scipy.ndimage import binary_erosion, label  # this import takes a fifth of a second
 
-    nodes, count = label(grid.inside)  # as in the net, nodes are connected along the axes
+    nodes, count = label(grid.inside)  # nodes are connected along the axes, as in the net
     if count < 2:
         return nodes, count, ()
     low, high = (np.array([axis[end] for axis in grid.axes]) for end in (0, -1))
@@ -224,7 +207,7 @@ def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]
 
 
 def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -> Indices | None:
-    """Path (K, 3) from node `start` to another component, with the highest possible lowest value; None if not found."""
+    """Path (K, 3) from node `start` to another component, with the highest possible minimum; None if not found."""
     shape, others = values.shape, set(ends.tolist()) - {0}
     before: dict[_Node, _Node | None] = dict.fromkeys((x, y, z) for x, y, z in start.tolist())
     waiting: list[tuple[float, _Node]] = [(-np.inf, node) for node in before]
@@ -247,7 +230,7 @@ def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -
 
 
 def _walk(level: Level, path: Array, step: Array) -> Array | None:
-    """Closely spaced positions (K, 3) in the set along `path`. The ends of `path` are in the set. None if not found."""
+    """Walk: closely spaced positions (K, 3) in the set along `path`, whose ends are in the set. None if not found."""
     turn = np.random.default_rng(0)
     path, at = path.copy(), level_values(level, path).copy()
     if len(path) > 2:
@@ -264,7 +247,7 @@ def _walk(level: Level, path: Array, step: Array) -> Array | None:
         between, at = _moved_inside(level, between, level_values(level, between), along[k], turn)
         found = at >= 0.0
         path = np.insert(path, k[found] + 1, between[found], axis=0)
-        share = 0.5 if found.all() else turn.uniform(0.2, 0.8)  # try another position after a division has failed
+        share = 0.5 if found.all() else turn.uniform(0.2, 0.8)  # after a division has failed, another position is tried
     return None
 
 

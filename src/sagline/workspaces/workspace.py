@@ -12,20 +12,22 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import brief, callback, choice, instance, whole_number
-from sagline.core.arrays import Array, Codes, Indices, locked, number
+from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved, formats
 from sagline.robot.pose import PoseBox
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import DEFAULT, method_of
+from sagline.workspaces.balanced import check_arguments
 from sagline.workspaces.boundary import MOST_CELLS, boundary, uncertain_volume
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_continuous
 from sagline.workspaces.levels import Hull, Levels, Nearest, nearest_to
-from sagline.workspaces.region import AXES, Orientations, Tilts, flat_axis, orientations_of, region_of
+from sagline.workspaces.region import AXES, Orientations, Region, Tilts, flat_axis, orientations_of, region_of
 from sagline.workspaces.separation import exclusion, separated
 from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
@@ -42,7 +44,7 @@ _HEAD: Final = 12  # indentation of each line, in columns
 
 
 class Limit(NamedTuple):
-    """Share of the surface that one criterion and one cable limit.
+    """Share of the surface that is limited by one criterion and one cable.
 
     Attributes:
         criterion: Title of the criterion.
@@ -63,10 +65,10 @@ class Limit(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Workspace(Result, Saved):
-    """Result of `workspace`.
+    """Workspace of a robot: the result of `workspace`.
 
-    For a planar robot, and in a box without extent along one axis, the workspace is a part of a plane. Then the volume
-    is an area [m2], and the surface encloses a slab around the area.
+    For a planar robot, and in a box without extent along one axis, the workspace is a part of a plane. The volume of a
+    workspace in a plane is an area [m2], and the surface encloses a slab around the area.
 
     Attributes:
         robot: The robot.
@@ -81,16 +83,16 @@ class Workspace(Result, Saved):
             upper bound.
         unit: Unit of the volume, "m³" or "m²".
         volume: Volume or area in this unit.
-        volume_error: Error bound of the volume; 0 for an empty workspace. It includes the volume between triangles and
-            boundary, and the uncertainty of the margin at vertices. It does not include parts and gaps that are thinner
-            than two cells of the finest grid.
+        volume_error: Error bound of the volume; 0 for an empty workspace. The bound includes the volume between
+            triangles and boundary, and the uncertainty of the margin at vertices. The bound does not include parts and
+            gaps that are thinner than two cells of the finest grid.
         components: Components of the workspace.
         surface: The closed boundary, including the faces of the box that the workspace reaches.
         limiting: Index of the limiting criterion at each vertex of the surface, shape (V,); -1 on a face of the box.
         limiting_cable: Limiting cable at each vertex, shape (V,); -1 if there is none.
         margin: Margin of the loads at each vertex [N], shape (V,).
         open_faces: Faces of the box that the workspace reaches, for example "x low". The workspace may continue beyond
-            these faces; the volume is the volume inside the box.
+            open faces; the volume is the volume inside the box.
         x: Coordinates of the nodes of the grid [m], shape (X,).
         y: Coordinates of the nodes along y, shape (Y,).
         z: Coordinates of the nodes along z, shape (Z,).
@@ -124,13 +126,13 @@ class Workspace(Result, Saved):
 
     @property
     def axes(self) -> tuple[Array, Array, Array]:
-        """Coordinates of the nodes of the grid along x, y and z [m]."""
+        """Coordinates of the nodes of the grid [m]: along x, along y, and along z."""
         return self.x, self.y, self.z
 
     @property
     def limits(self) -> tuple[Limit, ...]:
         """Criteria and cables that limit the workspace, in decreasing order of their shares of the surface."""
-        inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # False for triangles on the box
+        inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # False for triangles on a face of the box
         areas = vertex_areas(self.surface.vertices, self.surface.faces[inner])
         k = np.flatnonzero((self.limiting != BY_BOX) & (areas > 0.0))
         pairs, place = np.unique(
@@ -184,7 +186,7 @@ class Workspace(Result, Saved):
 
 
 def amount_of(space: Workspace) -> str:
-    """Text of the volume or area with its error bar, "789.4 ± 0.2 m³", and of the number of parts."""
+    """Text of the volume or area with its error bar, such as "789.4 ± 0.2 m³", and of the number of parts."""
     if space.nearest is not None:
         return f"empty, 0 {space.unit}"
     if space.volume_error <= 1e-9 * space.volume:  # the workspace is the whole box
@@ -197,9 +199,9 @@ def amount_of(space: Workspace) -> str:
 
 
 def facts_of(space: Workspace) -> list[tuple[str, str]]:
-    """Box, loads, orientations, model and criteria of a workspace, as pairs of a heading and a text."""
+    """Box, loads, orientations, model and criteria of a workspace. Each is a pair of a heading and a text."""
     facts = [("box", f"{span_of(space.box)} m"), ("loads", str(space.wrenches))]
-    facts += [("platform", str(space.orientations)), ("cables", type(space.model).__name__)]
+    facts += [("platform", orientations_text(space)), ("cables", type(space.model).__name__)]
     if space.hull != "exact":
         facts.append(("hull", HULLS[space.hull]))
     if asked := [str(one) for one in space.criteria if not one.always]:
@@ -216,12 +218,19 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
     return facts
 
 
+def orientations_text(space: Workspace) -> str:
+    """Text of the orientations of a workspace."""
+    if is_underconstrained(space.robot):
+        return f"rotation from the balance of {counted(space.robot.cable_count, 'cable')}"
+    return str(space.orientations)
+
+
 def _separation_text(components: Components) -> str:
-    """Sentence on the parts: proved separate, or the result of the search for a connection."""
+    """Sentence about the parts of a workspace: proofs that they are separate, or results of the search for paths."""
     proved = int(components.separate.sum())
     if proved == components.count:
         return "proved: no path in the box leads from one part to another"
-    rest = "the robot may be able to go from one part to another, because neither a path nor a proof was found"
+    rest = "neither a path between the parts nor a proof that they are separate was found"
     return f"{proved} proved separate; for the others, {rest}" if proved else rest
 
 
@@ -233,7 +242,7 @@ def span_of(box: PoseBox) -> str:
 
 LEAST_CELLS: Final = 4
 _CROSSED: Final = 100  # approximate number of evaluated poses per cell at the boundary
-ON_BOX: Final = 1e-9  # a vertex is on a face if its distance from the face, relative to the box, is smaller
+ON_BOX: Final = 1e-9  # a vertex counts as on a face of the box if its distance, relative to the box, is smaller
 _CATENARY = Catenary()
 
 
@@ -259,11 +268,15 @@ def workspace(
     bar of the volume includes the effect of the flat triangles, and the uncertainty of the margin at vertices. Parts
     that are thinner than a cell can be missed; only `prove` is certain for a whole box.
 
+    With three or four cables and six degrees of freedom, the robot is underconstrained: each position has one rotation
+    and one set of tensions, those of a stable equilibrium, as in `inverse`. The margin is the smallest distance of a
+    tension from its limits. It is computed for the middle and for each corner of the loads, with a rotation for each.
+
     Args:
-        robot: The robot. The workspace of a planar robot is an area. The plane_normal of this robot must be along x, y
-            or z.
-        box: Box of positions; a box without extent along an axis is a part of a plane. Its tilt has the meaning of
-            `Tilts`. None: the whole frame of the robot, or the box of its anchors down to the floor.
+        robot: The robot. The workspace of a planar robot is an area. The plane_normal of a planar robot must be along
+            x, y or z.
+        box: Box of positions; a box without extent along an axis is a part of a plane. A tilt of the box has the
+            meaning of `Tilts`. None: the whole frame of the robot, or the box of its anchors down to the floor.
         wrenches: Loads on the platform in addition to its weight; None for the weight alone.
         orientations: Orientations of the platform, `Tilts` or `Orientations`; None for the level orientation.
         criteria: Further criteria, for example `MaximumSag(0.05)`. Criteria on tensions use the tensions for the load
@@ -299,13 +312,14 @@ def workspace(
     """
     model, tension = model_of(model), method_of(tension)
     asked = _checked(robot, criteria, tension)
-    count = whole_number(cells, "cells", LEAST_CELLS, MOST_CELLS)
     report = callback(progress, "progress")
-    region = region_of(robot, box, count)
+    region = region_of(robot, box, whole_number(cells, "cells", LEAST_CELLS, MOST_CELLS))
     turned = orientations_of(robot, orientations, region.box.tilt)
     loads = load_of(wrenches)
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
     chosen = choice(hull, "hull", get_args(Hull))
+    if is_underconstrained(robot):
+        check_arguments(robot, turned, chosen, arm)
     levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box), hull=chosen)
     levels.on_block = None if report is None else _progress_of(report, region.cells)
     found = boundary(levels, region.low, region.high, region.cells, refine)
@@ -314,9 +328,7 @@ def workspace(
         components = replace(components, separate=separated(components, exclusion(levels)))
     decided = levels.details(surface.vertices)
     error = found.volume_error + uncertain_volume(levels, surface, decided.uncertainty, float(found.grid.step.max()))
-    near = ON_BOX * float((region.high - region.low).max())
-    beside = (surface.vertices - region.low < near) | (region.high - surface.vertices < near)
-    on_box = beside.any(axis=1) & (decided.level > 1e-6)
+    on_box = _next_to(surface.vertices, region) & (decided.level > 1e-6)
     flat = None if region.flat is None else AXES[region.flat]  # the faces of the slab around a plane are not open
     return Workspace(
         robot=robot,
@@ -346,7 +358,7 @@ def workspace(
 
 
 def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[int], None]:
-    """Function that reports progress, relative to the estimated number of poses at nodes and in boundary cells."""
+    """Function that reports progress, relative to the estimated number of all poses (nodes and boundary cells)."""
     x, y, z = cells
     about, done = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x), 0
 
@@ -358,8 +370,15 @@ def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[i
     return add
 
 
+def _next_to(points: Array, region: Region) -> Flags:
+    """Mask (N,) of points that are next to a face of the region's box."""
+    near = ON_BOX * float((region.high - region.low).max())
+    beside = (points - region.low < near) | (region.high - points < near)
+    return np.asarray(beside.any(axis=1))
+
+
 def _checked(robot: Robot, criteria: Sequence[Criterion], tension: TensionMethod) -> tuple[Criterion, ...]:
-    """Checked criteria; the margin is the first one."""
+    """Check the criteria. The result begins with the margin."""
     instance(robot, Robot, "robot")
     if not isinstance(criteria, list | tuple):
         raise InvalidValueError("criteria", brief(criteria), "a list of criteria", "Give [MaximumSag(0.05)].")

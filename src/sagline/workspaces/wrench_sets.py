@@ -1,7 +1,7 @@
 """Sets of loads on a platform, each described by its support function.
 
 The margin uses only the extent of a set W against a direction y: h_W(y) = max over w in W of -y . w. Every set of this
-module is a sum of four kinds: segments, ellipsoids, polytopes, and inertial loads. Their support functions are added.
+module is a sum of segments, ellipsoids, polytopes and inertial loads. Support functions of a sum are added.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _wrench(wrench: Array) -> str:
 
 
 def _segments(segments: Array) -> str:
-    """Text of segments: the sizes of the segments along axes, and the number of the other segments."""
+    """Text of segments: sizes of the segments along axes, and number of all other segments."""
     along = np.count_nonzero(segments, axis=1) == 1
     sizes = np.abs(segments[along]).sum(axis=0)
     parts = [f"±{_each(own, unit)}" for own, unit in ((sizes[:3], "N"), (sizes[3:], "N m")) if own.any()]
@@ -35,7 +35,7 @@ def _segments(segments: Array) -> str:
 
 
 def _each(values: Array, unit: str) -> str:
-    """Text of three numbers; equal numbers are written once."""
+    """Text of three numbers. If all are equal, the number is written once."""
     if np.ptp(values) == 0.0:
         return n(values[0], unit=unit)
     return f"({', '.join(n(value) for value in values)}) {unit}"
@@ -95,7 +95,7 @@ class WrenchSet(ByFields):
         return f"<{type(self).__name__}: {self}>"
 
     def _fill(self, **parts: Array) -> None:
-        """Set the given fields; all others are empty."""
+        """Set the given fields, and make all other fields empty."""
         none = {
             "center": np.zeros(6),
             "segments": np.zeros((0, 6)),
@@ -161,7 +161,7 @@ class WrenchEllipsoid(WrenchSet):
             matrix: Matrix A of the wrenches A s with |s| <= 1, shape (6, 6), instead of the semi-axes.
 
         Raises:
-            InvalidValueError: If a number is not finite, a semi-axis is negative, a shape is wrong, or semi-axes and
+            InvalidValueError: If a number is not finite, a semi-axis is negative, or a shape is wrong. If semi-axes and
                 matrix are both given.
         """
         axes = _six(force, moment)
@@ -188,7 +188,7 @@ class WrenchPolytope(WrenchSet):
         """Check the corners.
 
         Args:
-            corners: Wrenches [N, N m], shape (C, 6), C >= 1; wrenches inside of the hull are allowed.
+            corners: Wrenches [N, N m], shape (C, 6), C >= 1; a corner may be inside of the hull of the others.
 
         Raises:
             InvalidValueError: If a number is not finite, or there are no corners.
@@ -230,11 +230,11 @@ class Accelerations(WrenchSet):
         self._fill(accelerations=np.array(both))
 
 
-NO_LOAD: Final[WrenchSet] = Accelerations()  # the set contains only zero: the weight alone
+NO_LOAD: Final[WrenchSet] = Accelerations()  # the set contains only the zero wrench, which means the weight alone
 
 
 def load_of(value: object) -> WrenchSet:
-    """Checked argument `wrenches`: a set, or None for the weight alone."""
+    """Check the argument `wrenches`: a set, or None for the weight alone."""
     if value is None:
         return NO_LOAD
     if not isinstance(value, WrenchSet):
@@ -248,12 +248,12 @@ def _center(center: ArrayLike | None) -> Array:
 
 
 def _six(force: ArrayLike, moment: ArrayLike) -> Array:
-    """Checked force and moment components, >= 0, shape (6,)."""
+    """Check force and moment components, >= 0, and return them together, (6,)."""
     return np.concatenate([_three(force, "force", "N"), _three(moment, "moment", "N m")])
 
 
 def _three(value: ArrayLike, item: str, unit: str) -> Array:
-    """Checked numbers >= 0, one or three, as shape (3,)."""
+    """Check `value`, one or three numbers >= 0, and return three numbers, (3,)."""
     given = checked(value, item, unit, low=0.0)
     if given.shape not in ((), (3,)):
         raise InvalidValueError(item, f"of shape {given.shape}", "a number, or shape (3,)", "Give one x, y, z.")

@@ -11,7 +11,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.simulation.chain_plant import chains_at_rest
+from sagline.dynamics.simulation.chain_equilibrium import chains_at_rest
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
@@ -190,8 +190,7 @@ def test_a_broken_cable_gives_the_same_tensions_at_half_the_step() -> None:
     for share in (1.0, 0.5):
         run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.5, step=share * 5e-5, events=sl.Break(0, 0.0))
         assert [event.kind for event in run.events] == ["break"]
-        assert np.isnan(run.nodes[-1, 0]).all()  # type: ignore[index]
-        assert run.tensions[-1, 0] == 0.0
+        assert np.isnan(run.length[-1, 0])
         after.append(run.events[0].tension_after)
     assert after[0] == pytest.approx(after[1], rel=0.002)
     assert after[0] == pytest.approx(1081.0, abs=1.0)  # after 424 N

@@ -209,7 +209,7 @@ def test_models_without_energy_are_refused() -> None:
 
 
 def test_growing_energy_ends_the_run_with_time_and_cable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sagline.dynamics.simulation.simulate.checked_step", lambda *_: 0.09)
+    monkeypatch.setattr("sagline.dynamics.simulation.simulate._checked_step", lambda *_: 0.09)
     state = state_at_rest()
     with refused("step", next_step="Give step=0.018.", kind=sl.InvalidValueError) as caught:
         sl.simulate(state, wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, integrator="splitting")

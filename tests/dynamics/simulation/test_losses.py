@@ -51,7 +51,7 @@ def test_recorded_tensions_include_damping(
 
 def test_losses_of_cables_with_mass_do_not_limit_the_step() -> None:
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0.0, 0.0, 2.0), np.eye(3))).state
-    given: dict[str, Any] = {"duration": 0.06, "cable_mass": "lumped", "nodes": 8, "events": [sl.Break(0, 0.01)]}
+    given: dict[str, Any] = {"duration": 0.06, "cable_mass": "lumped", "nodes": 8, "events": [sl.Drop(60.0, 0.01)]}
     free = sl.simulate(state, **given)
     run = sl.simulate(state, damping=sl.Damping(loss_time=1e-2), **given)
     assert run.step == free.step

@@ -10,7 +10,7 @@ from scipy.integrate import simpson, solve_ivp
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.simulation.modal import modal_model, modal_response
+from sagline.dynamics.simulation.modal import _modal_model, _modal_response
 from tests.refusal import refused
 from tests.tiers import extended
 
@@ -35,7 +35,7 @@ def test_modes_under_straight_forces_are_exact() -> None:
     rng = np.random.default_rng(1)
     frequency, ratio, step = rng.uniform(1, 20, 3), np.array([0.0, 0.02, 0.7]), 0.01
     force = rng.normal(size=(101, 3))
-    amplitude, rate, _, lost = modal_response(frequency, ratio, force, step)
+    amplitude, rate, _, lost = _modal_response(frequency, ratio, force, step)
     time = np.arange(101) * step
 
     def rates(t: float, y: Array) -> Array:
@@ -49,7 +49,7 @@ def test_modes_under_straight_forces_are_exact() -> None:
     assert rate[-1] == pytest.approx(exact[3:], abs=1e-11)
     assert (np.diff(lost) > 0.0).all()
     for damped, off in ((ratio, 2e-3), (0.0 * ratio, 1e-10)):
-        amplitude, rate, supplied, lost = modal_response(frequency, damped, force, step)
+        amplitude, rate, supplied, lost = _modal_response(frequency, damped, force, step)
         energy = 0.5 * (rate**2 + (amplitude * frequency) ** 2).sum(axis=1)
         assert energy == pytest.approx(supplied - lost, abs=off * energy.max())
 
@@ -80,7 +80,7 @@ def test_small_motions_agree_with_lumped_cables(what: str, off: float) -> None:
 
 def test_what_modes_leave_to_rest_is_little() -> None:
     """By Betti's theorem a cable let out drives the modes; at rest they sum to the exact sensitivity of the pose."""
-    (_, _, motion, _, _), rest = modal_model(state(), sl.Damping()), sl.stiffness(state())
+    (_, _, motion, _, _), rest = _modal_model(state(), sl.Damping()), sl.stiffness(state())
     m = state().robot.cable_count  # type: ignore[union-attr]
     assert np.abs(motion[:, :m]).max() < 0.02 * np.abs(rest.length_sensitivity).max()
     assert np.abs(motion[:, m:]).max() < 1e-3 * np.abs(rest.compliance).max()
@@ -88,7 +88,7 @@ def test_what_modes_leave_to_rest_is_little() -> None:
 
 def test_tensions_of_a_mode_are_its_dynamic_stiffness_less_the_inertia_of_the_cable() -> None:
     """From the platform end, by the exact dynamic stiffness, the force changes by rho omega^2 times the shape."""
-    (found, _, _, pulled, _), cables = modal_model(state(), sl.Damping()), state().cables
+    (found, _, _, pulled, _), cables = _modal_model(state(), sl.Damping()), state().cables
     frequency, shape = found.frequency[:6], found.cable_shape[:6]
     exact = sl.dynamic_stiffness(state(), frequency).real
     mean = simpson(shape, dx=1.0 / (shape.shape[2] - 1), axis=2)

@@ -70,9 +70,23 @@ def test_a_plan_beyond_the_limits_runs_and_reports_saturated_winches() -> None:
     run = sl.simulate(plan, winches="robot", duration=3.0)
     told = {event.cable: event.time for event in reversed(run.events) if event.kind == "saturate"}
     assert set(too_fast) <= set(told)
+    assert {event.limit for event in run.events} == {"speed"}
     for winch in too_fast.tolist():
         first = plan.path.time[np.argmax(rates.too_fast[:, winch])]
         assert told[winch] == pytest.approx(first, abs=0.05)
+
+
+def test_a_saturated_winch_tells_which_limits_are_active() -> None:
+    """Motors too weak for the tensions at rest; the sagging platform then asks for more than the highest speed."""
+    weak = prototype(torque_limit=0.12)
+    run = sl.simulate(lift(weak, 1.0), winches="robot", duration=1.0)
+    at_start = {event.cable for event in run.events if event.limit == "torque" and event.time == run.step}
+    assert at_start == set(range(8))
+    later = [event for event in run.events if event.limit == "torque and speed"]
+    assert min(event.time for event in later) > 0.05
+    assert later[0].text.endswith(f"({later[0].limit}) of cable {later[0].cable}")
+    held = sl.simulate(lift(weak, 1.0), winches="robot", duration=0.1, events=sl.Break(1, 0.05))
+    assert [event.limit for event in held.events if event.kind == "break"] == [None]
 
 
 def test_friction_holds_a_drum_under_small_forces() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.dynamics.vibration.component_modes import component_modes
-from sagline.dynamics.vibration.robot_modes import vibration_model
+from sagline.dynamics.vibration.component_modes import CableComponents
+from sagline.dynamics.vibration.robot_modes import VibrationModel
 from sagline.statics.strings import Strings, strings_below, taut_of
 from tests.kernels.dynamics.strings import string
 from tests.tiers import wide
@@ -28,7 +28,7 @@ def test_the_count_agrees_with_component_modes(count: int) -> None:
             continue
         ringing = np.sqrt(max(horizontal, 0.1 * whole) / table[0, 5]) / (2.0 * length)
         up_to = ringing * random.uniform(1.0, 12.0)
-        frequency = np.sqrt(np.maximum(component_modes(strings, 0, 1.3 * up_to).square, 0.0)) / (2.0 * np.pi)
+        frequency = np.sqrt(np.maximum(CableComponents.of(strings, 0, 1.3 * up_to).square, 0.0)) / (2.0 * np.pi)
         if np.abs(frequency / up_to - 1.0).min() > 1e-5:
             found = int(strings_below(strings, np.array([[up_to]])).sum())
             assert found == (frequency < up_to).sum(), (table, up_to)
@@ -52,6 +52,6 @@ def test_robots_with_slightly_wrong_lengths_have_results(name: str, count: int) 
         if not np.isfinite(lowest):
             continue
         found = sl.vibration(state, up_to=4.0 * float(lowest))
-        slack = np.flatnonzero(~vibration_model(state).strings.taut[0])
+        slack = np.flatnonzero(~VibrationModel.of(state).strings.taut[0])
         assert found.complete or list(found.slack_cables) == slack.tolist() != []
         assert found.count == found.frequency.size

@@ -8,7 +8,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.vibration.mode_sensitivities import StringData, _edges, _longest
+from sagline.dynamics.vibration.mode_sensitivities import _edges, _longest, _StringData
 from tests.dynamics.linear_systems import mass_of
 from tests.kinematics.feasible import feasible_plan
 from tests.refusal import refused
@@ -207,7 +207,7 @@ def test_cables_over_pulleys_are_refused() -> None:
 
 @pytest.mark.parametrize("level", [0.0, 1e-12, 1e-3, 1.0, 50.0])
 def test_the_number_of_elements_is_limited_for_folding_cables(level: float) -> None:
-    cable = StringData(np.array([level, 0.0, 4.0]), 1.0, 9.0, 1e5, 0.1)
+    cable = _StringData(np.array([level, 0.0, 4.0]), 1.0, 9.0, 1e5, 0.1)
     edges, omega = _edges(cable, 40.0), 40.0
     assert (edges[0], edges[-1]) == (0.0, 9.0)
     assert edges.size < 400

@@ -11,7 +11,7 @@ from scipy.integrate import simpson
 import sagline as sl
 from sagline.dynamics.vibration import robot_modes
 from sagline.dynamics.vibration.dynamic_stiffness import EXACT, in_world
-from sagline.dynamics.vibration.robot_modes import dynamic_matrix, modes_below, vibration_model
+from sagline.dynamics.vibration.robot_modes import VibrationModel, _dynamic_matrix, modes_below
 from sagline.kernels.dynamics import collocation
 from tests.dynamics.linear_systems import mass_of
 from tests.dynamics.states import at, middle
@@ -39,7 +39,7 @@ def test_every_frequency_by_the_exact_count(name: str) -> None:
     """k - 1 modes are below f - 1e-5 Hz, and k modes below f + 1e-5 Hz: all are exact, none is missed."""
     state = middle(name)
     up_to = 0.5 if name == "fast" else 10.0
-    found, setting = sl.vibration(state, up_to=up_to), vibration_model(state)
+    found, setting = sl.vibration(state, up_to=up_to), VibrationModel.of(state)
     assert found.complete
     for number, frequency in enumerate(found.frequency):
         twins = int((np.abs(found.frequency - frequency) < 2e-5).sum()) - 1
@@ -50,7 +50,7 @@ def test_every_frequency_by_the_exact_count(name: str) -> None:
 
 def test_the_count_at_frequencies_to_fifty_hertz() -> None:
     state = middle("cogiro")
-    setting, found = vibration_model(state), sl.vibration(state, up_to=50.0)
+    setting, found = VibrationModel.of(state), sl.vibration(state, up_to=50.0)
     assert found.complete
     for frequency in (2.0, 4.1, 11.3, 20.0, 33.3, 49.9):
         assert (found.frequency < frequency).sum() == modes_below(setting, 0, frequency)
@@ -76,7 +76,7 @@ def test_shapes_have_the_stated_energy(name: str) -> None:
     energy = simpson((found.cable_shape**2).sum(axis=-1), dx=1.0 / (points - 1), axis=2)
     energy *= state.one_robot.cables.linear_density * cables.unstrained_length
     assert pytest.approx(found.cable_share, abs=3e-6) == energy.T
-    ends = vibration_model(state).ends[0] @ found.shape
+    ends = VibrationModel.of(state).ends[0] @ found.shape
     assert np.moveaxis(found.cable_shape[:, :, -1], 0, -1) == pytest.approx(ends, abs=1e-12)
 
 
@@ -96,8 +96,8 @@ def test_losses_agree_with_roots_in_the_complex_plane(name: str) -> None:
 
 def _root(state: sl.Equilibrium, damping: sl.Damping, omega: complex) -> complex:
     """Root of det D near a complex frequency, by the secant method."""
-    setting = vibration_model(state)
-    static = np.abs(np.linalg.det(dynamic_matrix(setting, 0, np.zeros((8, 3, 3)), 0.0)))
+    setting = VibrationModel.of(state)
+    static = np.abs(np.linalg.det(_dynamic_matrix(setting, 0, np.zeros((8, 3, 3)), 0.0)))
 
     def determinant(at: complex) -> complex:
         waves = np.zeros((1, 1, collocation.WAVE_COLUMNS), dtype=np.complex128)
@@ -137,7 +137,7 @@ def test_a_platform_on_weightless_cables_agrees_with_modes() -> None:
 def test_elastic_cables_without_weight_vibrate() -> None:
     robot = sl.load_robot("cogiro")
     state = sl.inverse(robot, sl.Pose((0.5, 0.3, 2.0), np.eye(3)), sl.Elastic()).state
-    found, setting = sl.vibration(state, up_to=12.0), vibration_model(state)
+    found, setting = sl.vibration(state, up_to=12.0), VibrationModel.of(state)
     assert found.complete
     assert found.count > 16
     assert modes_below(setting, 0, 12.0) == found.count
@@ -246,7 +246,7 @@ def test_modes_above_the_first_string_frequency_are_marked(name: str) -> None:
 def _first_string(state: sl.Equilibrium) -> float:
     from tests.kernels.dynamics.strings import held
 
-    table = vibration_model(state).strings.table[0]
+    table = VibrationModel.of(state).strings.table[0]
     return min(held(table[i : i + 1], 1, plane, 1e-6) for i in range(len(table)) for plane in (0, 1))
 
 

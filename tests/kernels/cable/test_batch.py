@@ -7,9 +7,10 @@ import pytest
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable import models
-from sagline.kernels.cable.batch import BUFFERS, CHUNK, batch_end, batch_from_length, batch_from_tension
+from sagline.kernels.cable.batch import batch_end, batch_from_length, batch_from_tension
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms
 from sagline.kernels.codes import CABLE_NO_TENSION, CATENARY, ELASTIC, EMPIRICAL, PARABOLIC, STRAIGHT
+from sagline.kernels.tables import BUFFERS, CHUNK
 from tests.kernels.cable.exact import length_and_pull
 from tests.kernels.compiled import from_python
 

@@ -108,6 +108,25 @@ def test_the_chord_touches_the_pulley_on_the_side_of_the_cable() -> None:
     assert touched > 1000
 
 
+def test_steep_slack_cables_leave_pulleys_in_the_direction_of_their_force() -> None:
+    rng = np.random.default_rng(4)
+    model, material, over = Model(CATENARY, 0.0, 0.0, GRAVITY), Material(0.2, 300.0), Pulley(0.15, 1.0, 0.0, 0.0)
+    weight = material.density * GRAVITY
+    for _ in range(300):
+        line = Chord(*(float(x) for x in tangent(0.15, 1.0, rng.uniform(0.15, 0.5), rng.uniform(0.9, 3.0))))
+        tension = 0.5 * weight * (line.length + 2.0 * over.radius) / rng.uniform(2.5, 5.0)
+        free, sag_force, status = solve_cable_state(model, line, material, over, tension)
+        assert status == CABLE_SOLVED
+        horizontal, vertical = tension * line.cosine, tension * line.sine + sag_force
+        angle = math.atan2(horizontal, vertical - weight * free)
+        span, rise = free_span(over, line, math.cos(angle)), free_rise(over, line, math.sin(angle))
+        own = math.hypot(span, rise)
+        assert span > 0.0
+        length, again, _ = from_tension(model, Chord(own, rise / own, span / own), material, horizontal * own / span)
+        assert length == pytest.approx(free, rel=1e-9)
+        assert horizontal * rise / span + again == pytest.approx(vertical, abs=1e-9)
+
+
 def lengths_and_recovered_tensions(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
     """Lengths of random cables over pulleys at chord tensions, and the tensions of these lengths.
 

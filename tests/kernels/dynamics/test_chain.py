@@ -122,7 +122,7 @@ def test_a_birth_conserves_the_tension_and_without_dead_length_the_center_of_mas
 
 def looked_at(chain: Chain, time: float = 0.0) -> Array:
     """Lost power, strain, potential and kinetic energy, and H after a short time at constant speeds [W, J, J, J, N]."""
-    place, speed, pulls, seen = chain.place.copy(), chain.speed.copy(), np.zeros(3 * ROOM), np.zeros(5)
+    place, speed, pulls, seen = chain.place.copy(), chain.speed.copy(), np.zeros(4 * ROOM), np.zeros(5)
     place[:, : chain.free + 1] += time * speed[:, : chain.free + 1]
     look(place, speed, chain.free, chain._replace(rest=chain.rest + time * chain.rate).known, pulls, seen)
     return seen

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.codes import CENTROID, POLYGON_WALK, POSE_INFEASIBLE, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.tension import on_polygon as o
@@ -17,7 +18,7 @@ feasible_interval = from_python(o.feasible_interval)
 centroid = from_python(o.centroid)
 lowest_corner = from_python(o.lowest_corner)
 
-WALKS = [o.WALK_SUM, o.WALK_NORM, o.WALK_CENTROID]
+WALKS = [codes.WALK_SUM, codes.WALK_NORM, codes.WALK_CENTROID]
 
 
 def test_centroid_of_a_triangle_and_a_trapezoid() -> None:
@@ -60,9 +61,9 @@ def expected_point(problem: Problem, method: int, parameter: float, reference: n
     corners = brute_corners(problem)
     middle = corners.mean(axis=0)
     corners = corners[np.argsort(np.arctan2(*(corners - middle).T[::-1]))]
-    if method == POLYGON_WALK and parameter == o.WALK_SUM:
+    if method == POLYGON_WALK and parameter == codes.WALK_SUM:
         return np.asarray(min(corners, key=lambda corner: problem.tensions(corner).sum()))
-    if method == POLYGON_WALK and parameter == o.WALK_NORM:
+    if method == POLYGON_WALK and parameter == codes.WALK_NORM:
         if problem.keeps_limits(problem.tensions(reference), 0.0):
             return reference
         share = np.linspace(0.0, 1.0, 20001)[:, None]
@@ -90,7 +91,7 @@ def test_the_chosen_point_in_several_iterations(method: int, parameter: float) -
                 assert room.known[0] == 0
                 continue
             expected = expected_point(moved, method, parameter, near.reference)
-            tolerance = 0.02 if parameter == o.WALK_NORM and method == POLYGON_WALK else 1e-6
+            tolerance = 0.02 if parameter == codes.WALK_NORM and method == POLYGON_WALK else 1e-6
             np.testing.assert_allclose(near.point, expected, atol=tolerance)
             assert moved.keeps_limits(moved.tensions(near.point), 1e-9)
             assert room.known[0] > 2
@@ -105,9 +106,9 @@ def test_one_redundant_cable(method: int, parameter: float) -> None:
         assert distribute_on_polygon(method, parameter, *problem, near, room) == POSE_SOLVED
         assert room.known[0] == 0
         ends = [problem.program(np.array([sign])).fun * sign for sign in (1.0, -1.0)]
-        if method == POLYGON_WALK and parameter == o.WALK_SUM:
+        if method == POLYGON_WALK and parameter == codes.WALK_SUM:
             expected = ends[0] if problem.null.sum() > 0.0 else ends[1]
-        elif method == POLYGON_WALK and parameter == o.WALK_NORM:
+        elif method == POLYGON_WALK and parameter == codes.WALK_NORM:
             expected = float(np.clip(near.reference[0], *ends))
         else:
             expected = 0.5 * (ends[0] + ends[1])

@@ -1,19 +1,18 @@
-"""Simulated robot with lumped-mass cables, and its equilibrium with an error of the order nodes^-2."""
+"""Simulated robot with lumped-mass cables."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.core.arguments import whole_number
-from sagline.core.arrays import Array, locked
+from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
+from sagline.dynamics.simulation.chain_equilibrium import chains_at_rest
 from sagline.dynamics.simulation.initial_conditions import InitialConditions, TimeTable
 from sagline.dynamics.simulation.plant import Plant
-from sagline.dynamics.simulation.results import displaced_pose
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
@@ -22,13 +21,10 @@ from sagline.kernels.dynamics import chains as run
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.progress import COUNTERS, FAILED
-from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
-from sagline.statics.slopes import platform_end_forces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LoadedPlatform:
+class _LoadedPlatform:
     """Platform together with point masses at its cable ends ("whole body"), in the principal axes of the whole body."""
 
     inertia: Array  # mass and principal moments of the whole body, (4,); infinite for a blocked rotation
@@ -36,7 +32,7 @@ class LoadedPlatform:
     axes: Array  # principal axes of the whole body in the principal axes of the platform, one per column, (3, 3)
 
     @classmethod
-    def of(cls, inertia: Array, masses: Array, ends: Array) -> LoadedPlatform:
+    def of(cls, inertia: Array, masses: Array, ends: Array) -> _LoadedPlatform:
         """Body of a platform with point masses at its cable ends; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
         mass = inertia[0] + masses.sum()
         center = (masses @ ends) / mass
@@ -112,7 +108,7 @@ class ChainPlant(Plant):
         state, robot = given.state, given.robot
         pose, at_rest, _ = chains_at_rest(state, nodes)
         super().__init__(robot, given.model, pose, given.twist, state.unstrained_length, data)
-        m, self.nodes, self.points = robot.cable_count, nodes, nodes + 1
+        m, self.nodes, self.points = robot.cable_count, nodes, nodes + 1  # points are recorded per cable
         self.rows[g.CHORD] = np.linalg.norm(at_rest[:, :, 0] - at_rest[:, :, -1], axis=1)
         self.counters = np.zeros(COUNTERS + 1, dtype=np.int64)
         table = _chain_table(given, at_rest, nodes, losses, data)
@@ -124,14 +120,14 @@ class ChainPlant(Plant):
             table,
             place,
             np.zeros_like(place),
-            np.zeros((m, 3 * capacity)),
+            np.zeros((m, 4 * capacity)),
             np.full(m, nodes - 1, dtype=np.int64),
         ]
         self._stock = np.full(2, np.nan)
         self._travel = nodes * table[:, c.ELEMENT] * np.sqrt(table[:, c.DENSITY] / table[:, c.STIFFNESS])
         self._ends = (robot.platform_anchors - robot.center_of_mass) @ self.axes
         self._carried = 0.5 * table[:, c.DENSITY] * table[:, c.ELEMENT]
-        self._carrier = LoadedPlatform.of(self.inertia, self._carried, self._ends)
+        self._carrier = _LoadedPlatform.of(self.inertia, self._carried, self._ends)
         turning = Rotation.from_quat(self.state[body.TURN : body.VELOCITY]).as_matrix()
         velocity, spin = self.state[body.VELOCITY : body.MOMENTUM], given.twist[3:]
         self.state = self._carrier.state(self.state[: body.TURN], turning, velocity, spin)
@@ -175,22 +171,99 @@ class ChainPlant(Plant):
         """Convert recorded states of the whole body to states of the platform."""
         return self._carrier.platform_states(states)
 
-    def remove_cable(self, cable: int) -> None:
-        """Remove a cable; half of its last element remains on the platform."""
-        place = int(np.flatnonzero(self.cables == cable)[0])
-        super().remove_cable(cable)
-        self._chains = [np.delete(array, place, axis=0) for array in self._chains]
+    def break_cable(self, cable: int, position: float) -> Indices:
+        """Break a cable at the node nearest to `position`, and lock its winch. Each piece becomes a chain."""
+        i, node = self._breaking_node(cable, position)
+        rows = np.arange(len(self.cables))
+        at_platform, at_frame = node == 0, node > self._chains[4][i]
+        piece = i  # row of the piece at the platform
+        if not at_platform and not at_frame:
+            piece = i + 1  # a new row after that of the piece at the frame
+            rows = np.insert(rows, piece, i)
+        self._chains = [array[rows] for array in self._chains]
+        self._select_rows(rows)
+        table, place, speed, _, counts = self._chains
+        if piece > i:
+            used = counts[i] + 2 - node
+            for array in (place[i], speed[i]):
+                array[:, :used] = array[:, node : node + used].copy()
+            counts[[i, piece]] = counts[i] - node, node - 1
+            self.rows[g.LENGTH, i] -= node * table[i, c.ELEMENT]
+            table[piece, c.REST] = table[i, c.ELEMENT]
+        elif at_frame:  # the cable between exit point and drum has the same strain as the element at the frame
+            last = float(np.linalg.norm(place[i, :, node] - place[i, :, node - 1]))
+            table[i, c.REST] *= (1.0 + table[i, c.BEHIND] / table[i, c.REST]) / (1.0 + table[i, c.RUN] / last)
+        else:
+            self._release_platform_end(i, cable)
+        if not at_platform:
+            table[piece, [c.FREE_END, c.BEHIND, c.RUN, c.RATE]] = 1.0, 0.0, 0.0, 0.0
+        if not at_frame:
+            table[i, c.FREE_START] = 1.0
+        pieces = np.flatnonzero(self.cables == cable)
+        self.lock_winches(pieces)
+        self.rows[g.CHORD, pieces] = -1.0  # a piece is not reported as slack
+        self._distribute_points(pieces)
+        return rows
+
+    def _breaking_node(self, cable: int, position: float) -> tuple[int, int]:
+        """Row of the piece that breaks, and the node of the break: the node nearest to `position`, except free ends."""
+        table, counts = self._chains[0], self._chains[4]
+        rows, begin, found = np.flatnonzero(self.cables == cable), 0.0, []
+        lengths = self._lengths_of(rows)
+        for i, length in zip(rows.tolist(), lengths.tolist(), strict=True):
+            nodes, n = np.arange(counts[i] + 2), counts[i]
+            way = begin + np.where(nodes > n, 0.0, length - nodes * table[i, c.ELEMENT])
+            # every piece has at least two points and is separated from the next piece by one point
+            whole = (nodes > 1) & (nodes < n) & (3 * len(rows) + 2 <= self.points)
+            whole[[0, -1]] = table[i, [c.FREE_START, c.FREE_END]] == 0.0
+            found += [(abs(way[j] - position * lengths.sum()), i, j) for j in np.flatnonzero(whole).tolist()]
+            begin += length
+        if not found:
+            value, allowed = f"broken into {len(rows)} pieces", f"pieces of more than three of {self.nodes} elements"
+            raise InvalidValueError(f"cable {cable}: break", value, allowed, "Give more nodes, or fewer breaks.")
+        return min(found)[1:]
+
+    def _lengths_of(self, rows: Indices) -> Array:
+        """Unstrained lengths of chains [m]."""
+        table, counts = self._chains[0], self._chains[4]
+        lengths: Array = counts[rows] * table[rows, c.ELEMENT] + table[rows, c.REST]
+        return lengths
+
+    def _release_platform_end(self, i: int, cable: int) -> None:
+        """Give the half element at the platform, which moves with the platform, to the piece in row `i`."""
+        own = self._platform_motion()
+        arm = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix() @ self._ends[cable]
+        self._chains[2][i, :, 0] = own[body.VELOCITY : body.MOMENTUM] + np.cross(own[body.MOMENTUM :], arm)
+        self._carried[cable] = 0.0
+        self._change_body(own)
+
+    def _distribute_points(self, pieces: Indices) -> None:
+        """Distribute the recorded points of a cable to its pieces, with one unused point between two pieces."""
+        spare = self.points - 3 * len(pieces) + 1  # beyond two points per piece
+        ends = np.round(spare * np.cumsum(self._lengths_of(pieces)) / self._lengths_of(pieces).sum())
+        number = 2 + np.diff(ends, prepend=0.0)
+        self._chains[0][pieces, c.POINTS] = number
+        self._chains[0][pieces, c.FIRST] = np.cumsum(number + 1.0) - number - 1.0
+
+    def _platform_motion(self) -> Array:
+        """State of the platform, with angular velocity, (13,)."""
+        moving = np.concatenate((self.state[: body.MOMENTUM], self._carrier.spin(self.state)))
+        motion: Array = self._carrier.platform_states(moving[None])[0]
+        return motion
+
+    def _change_body(self, own: Array) -> None:
+        """Set the whole body for the present masses; `own` (13,): state of the platform, with angular velocity."""
+        self._carrier = _LoadedPlatform.of(self.inertia, self._carried, self._ends)
+        turning = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix()
+        parts = own[: body.TURN], turning, own[body.VELOCITY : body.MOMENTUM], own[body.MOMENTUM :]
+        self.state = self._carrier.state(*parts)
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Set the platform's mass to `mass` [kg], its inertia in proportion. Cable masses at its ends are unchanged."""
-        before, state = self._carrier, self.state
-        spin = before.spin(state)
-        moving = np.concatenate((state[: body.MOMENTUM], spin))
-        own = before.platform_states(moving[None])[0]
+        """Set the platform's mass to `mass` [kg], its inertia in proportion; cable masses on it do not change."""
+        before, state, own = self._carrier, self.state, self._platform_motion()
         self.inertia = self.inertia * (mass / self.inertia[0])
-        self._carrier = after = LoadedPlatform.of(self.inertia, self._carried, self._ends)
-        turning = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix()
-        self.state = after.state(own[: body.TURN], turning, own[body.VELOCITY : body.MOMENTUM], spin)
+        self._change_body(own)
+        after = self._carrier
         if at_rest:  # momentum and angular momentum about any point are conserved
             momentum = before.inertia[0] * state[body.VELOCITY : body.MOMENTUM]
             arm = state[: body.TURN] - self.state[: body.TURN]
@@ -222,12 +295,8 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
     last = np.linalg.norm(place[:, :, -1] - place[:, :, -2], axis=1)
     table[:, c.RUN] = table[:, c.BEHIND] * last / table[:, c.ELEMENT]
     table[:, c.WIND], table[:, c.GRAVITY] = data[d.DRAG], given.robot.gravity
+    table[:, c.CABLE], table[:, c.POINTS] = np.arange(len(table)), nodes + 1
     return table
-
-
-def checked_nodes(nodes: Any) -> int:
-    """The checked number `nodes` of elements per cable."""
-    return whole_number(nodes, "nodes", FEWEST, MOST)
 
 
 def check_lumped(given: InitialConditions) -> None:
@@ -246,141 +315,3 @@ def wave_frequency(given: InitialConditions, nodes: int) -> float:
     material = given.robot.cables
     element = given.state.free_length / nodes
     return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())
-
-
-STEPS = 60
-NEAR = 1e-8  # relative error of a length or force; from this error, one more Newton step reaches rounding error
-NEUTRAL = 1e-12  # a stiffness below this share of the largest stiffness counts as zero
-# largest step, as a share of the force; after a longer step, a chain far from its solution could fold
-LONGEST_STEP = 0.2
-
-
-class _LumpedCables(NamedTuple):
-    """Cables divided into elements."""
-
-    element: Array  # unstrained length of the elements [m], shape (m,)
-    weight: Array  # weight per length [N/m], shape (m,)
-    stiffness: Array  # EA [N], shape (m,)
-    nodes: int  # elements per cable
-
-    def elements(self, force: Array) -> tuple[Array, Array]:
-        """Forces at the centers of the elements, platform end first, and their magnitudes."""
-        # shapes: force (m, 3) [N]; returns (m, nodes, 3) [N]
-        below = (np.arange(self.nodes) + 0.5) * (self.weight * self.element)[:, None]
-        forces = np.repeat(force[:, None, :], self.nodes, axis=1)
-        forces[..., 2] -= below
-        return forces, np.linalg.norm(forces, axis=-1)
-
-    def steps(self, force: Array) -> Array:
-        """Vectors along the elements toward the platform [m], shape (m, nodes, 3), for end forces (m, 3) [N]."""
-        forces, size = self.elements(force)
-        return (self.element[:, None] * (1.0 / self.stiffness[:, None] + 1.0 / size))[..., None] * forces
-
-    def compliance(self, force: Array) -> Array:
-        """Derivative of the platform ends of chains with respect to their forces (m, 3) [N], shape (m, 3, 3) [m/N]."""
-        forces, size = self.elements(force)
-        unit = forces / size[..., None]
-        across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
-        along = self.nodes / self.stiffness[:, None, None] * np.eye(3)
-        compliance: Array = self.element[:, None, None] * (along + (across / size[..., None, None]).sum(axis=1))
-        return compliance
-
-
-def chains_at_rest(state: Equilibrium, nodes: int) -> tuple[Pose, Array, Array]:
-    """Compute the platform and chains at rest with the cable lengths of `state`: pose, nodes and forces."""
-    # nodes: world axes, from the platform end to the exit [m], shape (m, 3, nodes + 1); forces: on the platform ends of
-    # the cables, including half an element's weight [N], shape (m, 3); the force on the platform is the opposite
-    #
-    # The force in an element is the force of the exact cable at the center of the element. The end of the chain
-    # therefore follows from the midpoint rule, and pose and forces have errors of the order nodes^-2. The wrench is
-    # balanced to rounding. Source: docs/model.md, section 11
-    robot, exits = state.one_robot, state.exit_point
-    length, material = state.free_length, state.cables.cable
-    chains = _LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
-    center, freedom = robot.center_of_mass, robot.freedom
-    given = state.wrench - np.array([0.0, 0.0, robot.mass * robot.gravity, 0.0, 0.0, 0.0])
-    force = platform_end_forces(state)
-    _refuse_slack(force, chains)
-    pose, near = state.pose, False
-    for _ in range(STEPS):
-        levers = (robot.platform_anchors - center) @ pose.matrix.T
-        force = _solve_chains(chains, pose.position + robot.platform_anchors @ pose.matrix.T - exits, force)
-        unbalance = np.concatenate((force.sum(axis=0), np.cross(levers, force).sum(axis=0))) - given
-        blocks = np.asarray(np.linalg.inv(chains.compliance(force)), dtype=np.float64)
-        motion = _balancing_motion(unbalance, _platform_stiffness(blocks, levers, force), freedom, _size(levers))
-        pose = displaced_pose(pose, robot, motion)
-        if near:
-            break
-        near = bool(np.abs(motion).max() <= NEAR * length.max())
-    else:
-        raise _no_rest("start", "an equilibrium, near which its chains have none")
-    ends = pose.position + robot.platform_anchors @ pose.matrix.T
-    force = _solve_chains(chains, ends - exits, force)
-    place = np.empty((len(force), nodes + 1, 3))
-    place[:, 0] = ends
-    place[:, 1:] = ends[:, None] - np.cumsum(chains.steps(force), axis=1)
-    place[:, -1] = exits
-    return pose, np.ascontiguousarray(np.swapaxes(place, 1, 2)), force
-
-
-def _refuse_slack(force: Array, chains: _LumpedCables) -> None:
-    slack = np.flatnonzero(~(chains.elements(force)[1].min(axis=1) > 0.0))
-    if slack.size:
-        raise _no_rest(f"cable {slack[0]}", "slack at the start")
-
-
-def _no_rest(item: str, value: str) -> InvalidValueError:
-    step = 'Start at another pose, or with cable_mass="none".'
-    return InvalidValueError(item, value, "taut cables that hold the platform", step)
-
-
-def _solve_chains(chains: _LumpedCables, chord: Array, force: Array) -> Array:
-    """Forces on the platform ends of chains with chords (m, 3). The iteration starts from nearby initial forces."""
-    near = False
-    for _ in range(STEPS):
-        missing = chord - chains.steps(force).sum(axis=1)
-        step = np.linalg.solve(chains.compliance(force), missing[..., None])[..., 0]
-        share = np.linalg.norm(step, axis=1) / np.linalg.norm(force, axis=1)
-        force = force + step / np.maximum(share / LONGEST_STEP, 1.0)[:, None]
-        if near:
-            return force
-        near = bool(share.max() <= NEAR)
-    raise _no_rest("start", "an equilibrium with a very slack cable, whose chain folds")
-
-
-def _size(levers: Array) -> float:
-    """Reference length [m] for rotations: the longest lever, or 1 if all cables meet in the center of mass."""
-    longest = float(np.linalg.norm(levers, axis=1).max())
-    return longest if longest > 0.0 else 1.0
-
-
-def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
-    """Motion of the platform that removes `unbalance`. It is zero in directions without stiffness."""
-    # example: for the rotation of a pendulum about its cable, stiffness and unbalance are zero, except for rounding
-    units = np.array([1.0, 1.0, 1.0, size, size, size])
-    slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
-    found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]
-    return np.asarray(freedom.T @ found / units)
-
-
-def _platform_stiffness(blocks: Array, levers: Array, force: Array) -> Array:
-    """Derivative (6, 6) of the unbalance with respect to platform motion, from the forces on the cable ends."""
-    turn = -_cross_matrix(levers)  # a rotation about an axis e moves the platform end by e x r
-    across = _cross_matrix(levers)
-    matrix = np.empty((6, 6))
-    matrix[:3, :3] = blocks.sum(axis=0)
-    matrix[:3, 3:] = (blocks @ turn).sum(axis=0)
-    matrix[3:, :3] = (across @ blocks).sum(axis=0)
-    # the force keeps its direction while r rotates: r T^T - (r.T) 1
-    kept = levers[:, :, None] * force[:, None, :] - (levers * force).sum(axis=1)[:, None, None] * np.eye(3)
-    matrix[3:, 3:] = (across @ blocks @ turn + kept).sum(axis=0)
-    return matrix
-
-
-def _cross_matrix(vectors: Array) -> Array:
-    """Matrices (m, 3, 3) that turn a vector v into r x v, for the rows r of `vectors`."""
-    matrix = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -z, y, -x
-    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = z, -y, x
-    return matrix

@@ -54,6 +54,27 @@ class TimeTable:
         """Time table with cubic interpolation between the rows of `value` (K, n), whose rates are `rate`."""
         return cls(time, value, np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(rate[1:]))
 
+    @classmethod
+    def of(cls, given: Any, item: str, unit: str, columns: int, begin: float) -> TimeTable:
+        """Convert `given` to a time table. It is one constant row, or times and rows with linear interpolation."""
+        # shapes: given (n,) [s]; begin [s]
+        if not (isinstance(given, tuple | list) and len(given) == 2):
+            return cls.constant(exactly(given, item, unit, (columns,)))
+        try:
+            time = checked_time(given[0])
+        except InvalidValueError as error:
+            raise InvalidValueError(f"{item}: {error.item}", error.value, error.allowed, error.next_step) from None
+        rows = checked(given[1], item, unit, shape=(None, columns))
+        if rows.shape != (time.size, columns):
+            allowed, step = f"shape ({time.size}, {columns})", "Give one row per time, or a single row."
+            raise InvalidValueError(item, f"of shape {rows.shape}", allowed, step)
+        if time[0] > begin:
+            allowed = f"a time <= {begin:g} s, the start"
+            raise InvalidValueError(
+                f"{item}: time[0]", f"{time[0]:g} s", allowed, "Start the table at the start of the simulation."
+            )
+        return cls.linear(time, rows) if time.size > 1 else cls.constant(rows[0])
+
     @property
     def arrays(self) -> CubicTableArrays:
         """Read-only, C-contiguous arrays for kernels."""
@@ -62,6 +83,15 @@ class TimeTable:
             for array in (self.time, self.value, self.begin, self.end)
         )
         return time, value, begin, end
+
+    def check_lengths(self, robot: Robot) -> None:
+        """Reject lengths [m] that do not exceed the dead lengths of `robot`."""
+        checked(self.value, "unstrained_length", "m")
+        least, dead = self.value.min(axis=0), dead_cable(robot)
+        if (short := least <= dead).any():
+            i = int(np.argmax(short))
+            allowed, step = f"> {dead[i]:g} m" + (", its dead length" if dead[i] else ""), "Give longer ones."
+            raise InvalidValueError(f"unstrained_length: cable {i}", f"{least[i]:g} m", allowed, step)
 
     def columns(self, columns: Any) -> TimeTable:
         """Time table with only the numbers that `columns` selects."""
@@ -124,27 +154,6 @@ class TimeTable:
         return TimeTable(table.time, value, begin, end)
 
 
-def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: float) -> TimeTable:
-    """Convert `given` to a time table. It is one constant row, or times and rows with linear interpolation."""
-    # shapes: given (n,) [s]; begin [s]
-    if not (isinstance(given, tuple | list) and len(given) == 2):
-        return TimeTable.constant(exactly(given, item, unit, (columns,)))
-    try:
-        time = checked_time(given[0])
-    except InvalidValueError as error:
-        raise InvalidValueError(f"{item}: {error.item}", error.value, error.allowed, error.next_step) from None
-    rows = checked(given[1], item, unit, shape=(None, columns))
-    if rows.shape != (time.size, columns):
-        allowed, step = f"shape ({time.size}, {columns})", "Give one row per time, or a single row."
-        raise InvalidValueError(item, f"of shape {rows.shape}", allowed, step)
-    if time[0] > begin:
-        allowed = f"a time <= {begin:g} s, the start"
-        raise InvalidValueError(
-            f"{item}: time[0]", f"{time[0]:g} s", allowed, "Start the table at the start of the simulation."
-        )
-    return TimeTable.linear(time, rows) if time.size > 1 else TimeTable.constant(rows[0])
-
-
 ROUNDING = 1e-12  # forces and moments below this share of the largest force and moment count as zero
 
 
@@ -186,8 +195,8 @@ def initial_conditions(
         )
     table = initial.wrench
     if wrench is not None:
-        table = checked_time_table(wrench, "wrench", "N or N m", 6, initial.begin)
-    check_set_points(initial.robot, initial.lengths)
+        table = TimeTable.of(wrench, "wrench", "N or N m", 6, initial.begin)
+    initial.lengths.check_lengths(initial.robot)
     return replace(initial, wrench=table, end=end)
 
 
@@ -239,7 +248,7 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
     tension, end = TimeTable.constant(np.nan_to_num(drum_tension(state))), 0.0
     lengths = TimeTable.constant(length)
     if table is not None:
-        lengths = checked_time_table(table, "unstrained_length", "m", robot.cable_count, 0.0)
+        lengths = TimeTable.of(table, "unstrained_length", "m", robot.cable_count, 0.0)
         tension = TimeTable.linear(lengths.time, np.repeat(tension.value, lengths.time.size, axis=0))
         end = float(lengths.time[-1])
     return InitialConditions(
@@ -262,13 +271,3 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Plan with Catenary() or Elastic(), whose forces have an energy."
         raise InvalidValueError("start: model", f"{type(model).__name__}()", "Catenary() or Elastic()", step)
-
-
-def check_set_points(robot: Robot, lengths: TimeTable) -> None:
-    """Reject `lengths` [m] that do not exceed the dead lengths of `robot`."""
-    checked(lengths.value, "unstrained_length", "m")
-    least, dead = lengths.value.min(axis=0), dead_cable(robot)
-    if (short := least <= dead).any():
-        i = int(np.argmax(short))
-        allowed, step = f"> {dead[i]:g} m" + (", its dead length" if dead[i] else ""), "Give longer ones."
-        raise InvalidValueError(f"unstrained_length: cable {i}", f"{least[i]:g} m", allowed, step)

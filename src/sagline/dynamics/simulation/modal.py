@@ -29,7 +29,7 @@ SHORTER: Final = "Simulate a shorter time, or record less often."
 SMALL: Final = 0.02  # largest change of a cable length, as a share of the length
 
 
-def modal_model(state: Equilibrium, damping: Damping) -> tuple[Vibration, Array, Array, Array, Array]:
+def _modal_model(state: Equilibrium, damping: Damping) -> tuple[Vibration, Array, Array, Array, Array]:
     """Modes of `state`, and their response to changes u = (dL, dw) of lengths and wrench, shape (m + 6,).
 
     Returns:
@@ -82,7 +82,7 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
     return force
 
 
-def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> tuple[Array, Array, Array, Array]:
+def _modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> tuple[Array, Array, Array, Array]:
     """Exact response of modes at rest to piecewise linear forces: amplitudes, rates, work and lost energy."""
     # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]; returns (N, K) twice, then (N,) twice
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
@@ -113,7 +113,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
     """Simulate the small motion of a robot about its initial equilibrium; `step` and `record` in s."""
     state = given.state
     _check(given)
-    found, drive, static_motion, pulled, static_tension = modal_model(state, damping)
+    found, drive, static_motion, pulled, static_tension = _modal_model(state, damping)
     frequency = 2.0 * np.pi * found.frequency
     if (found.loss >= 1.0).any():
         k = int(np.argmax(found.loss >= 1.0))
@@ -133,7 +133,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
     lengths, wrenches = given.lengths.at(time)[0], given.wrench.at(time)[0]
     change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
     _check_small_changes(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
-    response = modal_response(frequency, found.loss, change @ drive.T, size)
+    response = _modal_response(frequency, found.loss, change @ drive.T, size)
     at_steps = state.cables.frame_end_tension + response[0] @ pulled.T + change @ static_tension.T
     (amplitude, rate, supplied, lost), driven = (part[kept] for part in response), change[kept]
     motion = amplitude @ found.shape.T + driven @ static_motion.T
@@ -156,13 +156,6 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
         nodes=locked(_shapes(state, found, amplitude)),
         largest_tension=locked(at_steps.max(axis=0)),
     )
-
-
-def check_modal_arguments(others: list[str]) -> None:
-    """Reject the arguments `others` that the modal model does not support."""
-    if others:
-        step = 'Omit it, or give cable_mass="lumped".'
-        raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
 
 
 def _check(given: InitialConditions) -> None:

@@ -32,8 +32,8 @@ NOTES: Final = 1000  # number of recorded unscheduled events after which a run p
 class Records:
     """Records of N steps, which the kernel fills."""
 
-    def __init__(self, count: int, cables: int, points: int = 0) -> None:
-        """Allocate records for `count` steps; `points` per cable with mass."""
+    def __init__(self, count: int, cables: int, points: tuple[int, int] = (0, 0)) -> None:
+        """Allocate records for `count` steps; `points`: number of cables with mass, and of points per cable."""
         self.states = np.empty((count, body.STATE_COLUMNS))  # center of mass, principal axes, velocities: `rigid_body`
         self.tensions = np.empty((count, cables))  # tensions at the frame ends [N]
         self.lengths = np.empty((count, cables))  # unstrained lengths [m]
@@ -41,7 +41,7 @@ class Records:
         # events, see `sagline.kernels.dynamics.progress`; after NOTES events, a run pauses to store them
         self.notes = np.zeros((NOTES + 2 * cables, k.NOTE_COLUMNS))
         # points of cables with mass [m]; None without cable mass
-        self.points = np.full((count, cables, points, 3), np.nan) if points else None
+        self.points = np.full((count, *points, 3), np.nan) if points[1] else None
 
     @property
     def arrays(self) -> tuple[Array, ...]:
@@ -68,7 +68,8 @@ class Plant:
         self.turn = Rotation.from_matrix(self.axes).as_quat()  # rotation from principal axes to the platform frame
         self.turn_back = locked(self.turn * [-1.0, -1.0, -1.0, 1.0])  # inverse rotation
         self.inertia = np.array([robot.mass, *moments])
-        self.cables: Indices = np.arange(m)  # indices of the unbroken cables
+        self.cables: Indices = np.arange(m)  # cable of each row: unbroken cables, and pieces of broken cables with mass
+        self.broken: list[int] = []  # broken cables
         self._table = cable_table(robot)[0].copy()
         anchors = slice(tables.PLATFORM_X, tables.PLATFORM_Z + 1)
         self._table[:, anchors] = (robot.platform_anchors - robot.center_of_mass) @ self.axes
@@ -108,7 +109,7 @@ class Plant:
 
     def records(self, count: int) -> Records:
         """Allocate records for `count` steps."""
-        return Records(count, len(self.cables), self.points)
+        return Records(count, len(self.cables), (self.robot.cable_count, self.points))
 
     def platform_states(self, states: Array) -> Array:
         """Convert recorded states of the simulated body to states of the platform, (N, 13)."""
@@ -118,13 +119,15 @@ class Plant:
         """Create the error for a kernel that stopped at `time` [s]; `step`: time step [s]."""
         return energy_error(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
-    def remove_cable(self, cable: int) -> None:
-        """Remove the cable with the index `cable` in the original robot."""
-        place = int(np.flatnonzero(self.cables == cable)[0])
-        self.cables = np.delete(self.cables, place)
-        self._table = np.delete(self._table, place, axis=0)
-        self.layers = np.delete(self.layers, place, axis=0)
-        self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
+    def break_cable(self, cable: int, position: float) -> Indices:
+        """Remove a cable without mass, for any `position` of its break. Returns the previous rows of the new rows."""
+        return self._select_rows(np.flatnonzero(self.cables != cable))
+
+    def _select_rows(self, rows: Indices) -> Indices:
+        """Replace the rows of all cables by the previous rows `rows`."""
+        self.cables, self._table, self.layers = self.cables[rows], self._table[rows], self.layers[rows]
+        self.rows, self.now, self.data = (np.take(array, rows, axis=1) for array in (self.rows, self.now, self.data))
+        return rows
 
     def cut(self, places: Any) -> None:
         """Break the cables `places` during a run (indices of the present cables). The arrays keep their size."""

@@ -25,15 +25,22 @@ TIME, MASS = rule("s"), rule("kg", above=0.0)
 
 @dataclass(frozen=True, slots=True)
 class Break(NumberFields):
-    """Break of a cable. The cable is removed. Its energy is added to `energy.removed`.
+    """Break of a cable.
+
+    A cable without mass is removed. Its energy is added to `energy.removed`. The pieces of a cable with mass fall: the
+    piece at the platform stays attached to the platform, and the piece at the frame is suspended from its locked
+    winch.
 
     Attributes:
         cable: Index of the cable, from 0.
         time: Time of the event [s].
+        position: Place of the break, relative to the free length: 0 at the frame end, 1 at the platform end. A cable
+            with mass breaks at an end or at the nearest node at least two elements from all ends.
     """
 
     cable: int = field(metadata=WHICH)
     time: float = field(metadata=TIME)
+    position: float = field(default=1.0, metadata=rule(low=0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +110,8 @@ def event_cable(event: Event) -> int | None:
     return event.cable if isinstance(event, Break) else getattr(event, "winch", None)
 
 
-def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple[Event, ...]:
-    """Check that `events` are between `begin` and `end` [s], and sort them by time."""
+def checked_events(events: Any, robot: Robot, begin: float, end: float, *, pieces: bool) -> tuple[Event, ...]:
+    """Check that `events` are between `begin` and `end` [s], and sort them by time; `pieces` can break again."""
     found: list[Event] = []
     for k, event in enumerate(elements(events, Event, "events", "Give sl.Break(cable=3, time=2.5), or several.")):
         if not isinstance(event, Event):
@@ -116,22 +123,25 @@ def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple
             name = "cable" if isinstance(event, Break) else "winch"
             allowed = f"0 to {robot.cable_count - 1}, as {robot.name} has"
             raise InvalidValueError(f"events[{k}]: {name}", cable, allowed, "Indices start at 0.")
+        if isinstance(event, Break) and event.position > 1.0:
+            step = "Give 0 for the frame end, or 1 for the platform end."
+            raise InvalidValueError(f"events[{k}]: position", f"{event.position:g}", "0 to 1", step)
         if not begin <= event.time <= end:
             step = "Correct it, or give a longer duration."
             raise InvalidValueError(f"events[{k}]: time", f"{event.time:g} s", f"{begin:g} to {end:g} s", step)
         found.append(event)
     found.sort(key=lambda event: event.time)
-    _check_order(found, robot)
+    _check_order(found, robot, pieces=pieces)
     return tuple(found)
 
 
-def _check_order(events: list[Event], robot: Robot) -> None:
+def _check_order(events: list[Event], robot: Robot, *, pieces: bool) -> None:
     """Reject events of broken cables, and drops of more than the platform's mass."""
     broken: set[int] = set()
     mass = robot.mass
     for event in events:
         cable = event_cable(event)
-        if cable in broken:
+        if cable in broken and not (pieces and isinstance(event, Break)):
             step = "Remove the later events of this cable."
             raise InvalidValueError(f"events: cable {cable}", f"broken before {event.time:g} s", "there", step)
         if isinstance(event, Break):
@@ -159,8 +169,9 @@ class EnergyBalance(Result):
         supplied: Work done on the robot since the start by winches, external forces and wind.
         lost: Energy lost since the start, due to damping and friction, and due to averaging of strains on drums and
             creation and merging of chain nodes.
-        removed: Energy of broken cables and dropped loads since the start, minus the energy of picked-up loads. Heights
-            count as in `potential`, so that the value can have either sign.
+        removed: Energy of broken cables without mass and of dropped loads since the start, minus the energy of
+            picked-up loads. Heights count as in `potential`, so that the value can have either sign. For a cable with
+            mass that breaks at the frame: strain energy of the cable between exit point and drum.
         error: Energy error of the integrator: change of the sum kinetic + potential - supplied + lost + removed.
     """
 
@@ -183,6 +194,8 @@ class Occurrence:
         cable: Index of the cable or winch, or None for the platform.
         tension_before: Largest tension before the event [N]: of the named cable, or of any cable if none is named.
         tension_after: Largest tension of any cable after the event, until the next event or the end [N].
+        limit: Limits of the drive that are active at a "saturate" event: "torque", "speed" or "torque and speed". None
+            for other events.
     """
 
     time: float
@@ -190,6 +203,13 @@ class Occurrence:
     cable: int | None
     tension_before: float
     tension_after: float
+    limit: str | None = None
+
+    @property
+    def text(self) -> str:
+        """Kind of the event, with the active limits and the cable."""
+        what = self.kind if self.limit is None else f"{self.kind} ({self.limit})"
+        return what if self.cable is None else f"{what} of cable {self.cable}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -201,14 +221,15 @@ class Simulation(Result, Saved, Tabular):
         time: Times of the samples [s], increasing, shape (N,): at constant intervals, and at the end.
         pose: Poses of the platform, a batch of N.
         twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
-        tensions: Tensions at the frame ends [N], shape (N, m).
+        tensions: Tensions at the frame ends [N], shape (N, m). For a broken cable: the tension of its piece at the
+            frame, 0 without such a piece or without cable mass.
         length: Unstrained lengths off the drum [m], shape (N, m); NaN for a broken cable.
         energy: Energies over time.
         events: Events in order.
         cable_mass: "none", "lumped" or "modal".
         step: Time step of the integrator [s].
-        nodes: Positions of the nodes of every cable, world axes [m], shape (N, m, P, 3); None without cable mass, NaN
-            for a broken cable.
+        nodes: Positions of the nodes of every cable from the frame end to the platform end, world axes [m], shape (N,
+            m, P, 3); None without cable mass. NaN between the pieces of a broken cable.
         integrator: "runge-kutta" or "splitting"; "exact" for cable_mass="modal".
         winches: "ideal", "robot" or SecondOrder(...).
         winding: "constant" or "remembered".

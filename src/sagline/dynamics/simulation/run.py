@@ -3,33 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from sagline.core.arrays import locked
+from sagline.dynamics.simulation import results
 from sagline.dynamics.simulation.initial_conditions import TimeTable
 from sagline.dynamics.simulation.plant import NOTES, Plant, Records
-from sagline.dynamics.simulation.results import (
-    KINDS,
-    Brake,
-    Break,
-    Drop,
-    Event,
-    Occurrence,
-    PickUp,
-    Simulation,
-    Stall,
-    energy_balance,
-    event_cable,
-    twist_of_origin,
-)
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 
 BLOCK: Final = 20_000  # steps per block, about 100 ms; interrupts are handled between blocks
 NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
+LIMITS: Final = {d.TORQUE: "torque", d.SPEED_BOUND: "speed", d.TORQUE + d.SPEED_BOUND: "torque and speed"}
 Inputs = tuple[TimeTable, TimeTable, TimeTable]
 
 
@@ -44,7 +33,7 @@ class SimulationRun:
         inputs: Inputs,
         every: int,
         steps: int,
-        events: tuple[Event, ...] = (),
+        events: tuple[results.Event, ...] = (),
         settings: dict[str, Any] | None = None,
     ) -> None:
         """Record the first sample."""
@@ -55,7 +44,7 @@ class SimulationRun:
         self._record.tensions[:] = 0.0
         self._record.lengths[:] = np.nan
         self._removed = np.zeros(len(self._record.energies))  # removed energy; the kernel counts it as lost
-        self._occurrences: list[Occurrence] = []
+        self._occurrences: list[results.Occurrence] = []
         self._largest = np.zeros(plant.robot.cable_count)
         self._marks: list[int] = []  # indices of scheduled events in the list of events
         self._arguments: Any = plant.arguments(rules, numbers, inputs)
@@ -102,9 +91,11 @@ class SimulationRun:
             records.energies[kept],
         )
         if self._record.points is not None and records.points is not None:
-            self._record.points[rows, plant.cables] = records.points[kept]
-        self._record.tensions[rows, plant.cables] = records.tensions[kept]
-        self._record.lengths[rows, plant.cables] = records.lengths[kept]
+            self._record.points[rows] = records.points[kept]
+        cables, first = np.unique(plant.cables, return_index=True)  # the first row of a cable is that of its frame end
+        self._record.tensions[rows, cables] = records.tensions[kept][:, first]
+        self._record.lengths[rows, cables] = records.lengths[kept][:, first]
+        self._record.lengths[rows, plant.broken] = np.nan
 
     def _store_notes(self, records: Records) -> None:
         """Store the events that the kernel has recorded."""
@@ -112,7 +103,8 @@ class SimulationRun:
             cable = int(self.plant.cables[int(row[k.NOTE_CABLE])])
             kind = NAMES[row[k.NOTE_KIND]]
             before, after = float(row[k.NOTE_BEFORE]), float(row[k.NOTE_AFTER])
-            self._occurrences.append(Occurrence(float(row[k.NOTE_TIME]), kind, cable, before, after))
+            limit = LIMITS[row[k.NOTE_STATE]] if kind == "saturate" else None
+            self._occurrences.append(results.Occurrence(float(row[k.NOTE_TIME]), kind, cable, before, after, limit))
 
     def _record_now(self) -> Records:
         """Record the current step."""
@@ -122,17 +114,17 @@ class SimulationRun:
         self._store_notes(here)
         return here
 
-    def apply_event(self, event: Event) -> None:
+    def apply_event(self, event: results.Event) -> None:
         """Integrate up to `event`, and apply `event` at the first step at or after its time."""
         plant = self.plant
         self._advance(self._step_of(event))
         time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._record_now())
-        cable = event_cable(event)
+        cable = results.event_cable(event)
         places = plant.cables == cable if cable is not None else np.ones(len(plant.cables), dtype=np.bool_)
         peak = float(plant.now[d.PEAK][places].max())
         self._finish_event()
         self._marks.append(len(self._occurrences))
-        self._occurrences.append(Occurrence(time, KINDS[type(event)], cable, peak, 0.0))
+        self._occurrences.append(results.Occurrence(time, results.KINDS[type(event)], cable, peak, 0.0))
         start = plant.audit[d.START]
         self._apply(event, time)
         plant.counters[[k.READY, k.LENGTH_AT, k.WRENCH_AT, k.WIND_AT]] = 0
@@ -140,42 +132,41 @@ class SimulationRun:
         self._arguments = plant.arguments(self._rules, self._numbers, self._inputs)
         left = before - _energy(self._record_now())
         plant.audit[d.LOST] += left
-        if isinstance(event, Break | Drop | PickUp):
+        if isinstance(event, results.Break | results.Drop | results.PickUp):
             self._removed[int(plant.counters[k.STEPS]) // self.every + 1 :] += left
         plant.audit[d.START] = start
 
-    def _apply(self, event: Event, time: float) -> None:
+    def _apply(self, event: results.Event, time: float) -> None:
         plant, (lengths, wrenches, winds) = self.plant, self._inputs
         wide = lengths.value.shape[1] // len(plant.cables)
-        if isinstance(event, Break):
-            kept = np.tile(plant.cables != event.cable, wide)
-            plant.remove_cable(event.cable)
-            self._inputs = (lengths.columns(kept), wrenches, winds)
-        elif isinstance(event, Stall):
+        if isinstance(event, results.Break):
+            count, rows = len(plant.cables), plant.break_cable(event.cable, event.position)
+            plant.broken.append(event.cable)
+            columns = np.concatenate([rows + part * count for part in range(wide)])
+            self._inputs = (lengths.columns(columns), wrenches, winds)
+        elif isinstance(event, results.Stall):
             plant.lock_winches(plant.cables == event.winch)
-        elif isinstance(event, Brake):
+        elif isinstance(event, results.Brake):
             chosen = np.ones(len(plant.cables), dtype=np.bool_) if event.winch is None else plant.cables == event.winch
             columns = np.flatnonzero(np.tile(chosen, wide))  # this also preserves the expected tensions of the motors
             self._inputs = (lengths.with_stop(time, event.duration, columns), wrenches, winds)
-        elif isinstance(event, Drop):
+        elif isinstance(event, results.Drop):
             plant.with_mass(plant.inertia[0] - event.mass, at_rest=False)
-        elif isinstance(event, PickUp):
+        elif isinstance(event, results.PickUp):
             plant.with_mass(plant.inertia[0] + event.mass, at_rest=True)
 
     def _finish_event(self) -> None:
         """Store the largest tension after the last event, and the largest tension of the whole run."""
         np.maximum.at(self._largest, self.plant.cables, self.plant.now[d.PEAK])
         if self._marks:
-            last = self._marks[-1]
-            event = self._occurrences[last]
-            after = float(self.plant.now[d.PEAK].max())
-            self._occurrences[last] = Occurrence(event.time, event.kind, event.cable, event.tension_before, after)
+            last, peak = self._marks[-1], float(self.plant.now[d.PEAK].max())
+            self._occurrences[last] = replace(self._occurrences[last], tension_after=peak)
 
-    def finish(self) -> Simulation:
+    def finish(self) -> results.Simulation:
         """Integrate to the end."""
         return self.until(math.inf)
 
-    def until(self, time: float) -> Simulation:
+    def until(self, time: float) -> results.Simulation:
         """Continue to `time` [s], and return the simulation up to this time."""
         ahead = (time - float(self.plant.audit[d.BEGIN])) / self.step
         records = math.ceil(min(ahead, self.steps) / self.every - 1e-9)
@@ -186,24 +177,24 @@ class SimulationRun:
         self._finish_event()
         return self._result(-(-last // self.every) + 1)
 
-    def _step_of(self, event: Event) -> int:
+    def _step_of(self, event: results.Event) -> int:
         """The first step at or after the time of `event`."""
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
-    def _result(self, count: int) -> Simulation:
+    def _result(self, count: int) -> results.Simulation:
         """Create the result from the first `count` records."""
         plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
         kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)
         pose, velocity, spin = plant.poses(states), states[:, body.VELOCITY : body.MOMENTUM], states[:, body.MOMENTUM :]
-        return Simulation(
+        return results.Simulation(
             robot=plant.robot,
             time=locked(plant.audit[d.BEGIN] + steps * self.step),
             pose=pose,
-            twist=twist_of_origin(plant.robot, pose, velocity, spin),
+            twist=results.twist_of_origin(plant.robot, pose, velocity, spin),
             tensions=locked(self._record.tensions[:count].copy()),
             length=locked(self._record.lengths[:count].copy()),
-            energy=energy_balance(kinetic, potential, supplied, lost - removed, removed.copy()),
+            energy=results.energy_balance(kinetic, potential, supplied, lost - removed, removed.copy()),
             events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
             cable_mass=plant.cable_mass,
             step=self.step,

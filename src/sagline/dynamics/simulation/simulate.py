@@ -8,19 +8,13 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from sagline.core.arguments import choice, optional
+from sagline.core.arguments import choice, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.dynamics.simulation.chain_plant import ChainPlant, check_lumped, checked_nodes, wave_frequency
-from sagline.dynamics.simulation.initial_conditions import (
-    InitialConditions,
-    TableInTime,
-    TimeTable,
-    checked_time_table,
-    initial_conditions,
-)
-from sagline.dynamics.simulation.modal import check_modal_arguments, modal_simulation
+from sagline.dynamics.simulation.chain_plant import FEWEST, MOST, ChainPlant, check_lumped, wave_frequency
+from sagline.dynamics.simulation.initial_conditions import InitialConditions, TableInTime, TimeTable, initial_conditions
+from sagline.dynamics.simulation.modal import modal_simulation
 from sagline.dynamics.simulation.plant import Plant
 from sagline.dynamics.simulation.results import Drop, Event, PickUp, Simulation, checked_events
 from sagline.dynamics.simulation.run import SimulationRun
@@ -128,11 +122,13 @@ def simulate(
         107, 1997.
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
-    elements = checked_nodes(nodes)
+    elements = whole_number(nodes, "nodes", FEWEST, MOST)
     given = initial_conditions(start, unstrained_length, wrench, duration, pose)
     if cable_mass == "modal":
         others = {"events": events, "winches": winches != "ideal", "wind": wind is not None, "integrator": integrator}
-        check_modal_arguments([name for name, asked in others.items() if asked])
+        if refused := [name for name, asked in others.items() if asked]:
+            advice = 'Omit it, or give cable_mass="lumped".'
+            raise InvalidValueError(refused[0], "given", 'not given for cable_mass="modal"', advice)
         written = RECORD if record is None else number(record, "record", "s", above=0.0)
         return modal_simulation(given, optional(damping, Damping, "damping") or Damping(), step, written)
     return started_run(
@@ -172,8 +168,8 @@ def started_run(
     """Prepare a simulation at its first step."""
     if elements:
         check_lumped(given)
-    air = TimeTable.constant(np.zeros(3)) if wind is None else checked_time_table(wind, "wind", "m/s", 3, given.begin)
-    happening = checked_events(events, given.robot, given.begin, given.end)
+    air = TimeTable.constant(np.zeros(3)) if wind is None else TimeTable.of(wind, "wind", "m/s", 3, given.begin)
+    happening = checked_events(events, given.robot, given.begin, given.end, pieces=elements > 0)
     plant, rules, size, losses = initial_plant(
         given, elements, step, integrator, winches, winding, damping, happening, with_wind=wind is not None
     )
@@ -259,10 +255,9 @@ def _time_step(
     """Check `step` [s] for the smallest platform mass of the run; `data`: drives; `elements`: per cable with mass."""
     robot, lengths = given.robot, given.lengths.value
     waves = wave_frequency(given, elements) if elements else 0.0
-    platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
-    highest = frequency_with_winches(platform, kind, data, lengths, robot.cables.axial_stiffness)
+    highest = highest_frequency(robot, given.poses, lengths, kind, data, _lightness(robot.mass, events))
     # losses limit the step only for massless cables; for cables with mass, they are integrated implicitly
-    return checked_step(step, code, highest, Damping() if elements else losses, kind == d.DRUMS, waves)
+    return _checked_step(step, code, highest, Damping() if elements else losses, kind == d.DRUMS, waves)
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:
@@ -305,7 +300,24 @@ WAVE_SHARE: Final = 0.465
 LONGEST: Final = 1e-3  # s
 
 
-def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
+def highest_frequency(
+    robot: Robot, poses: Pose, lengths: Array, kind: int, data: Array, lightness: float = 1.0
+) -> float:
+    """Highest angular frequency of platform and winches as a coupled system [rad/s].
+
+    `lightness`: factor of the platform frequency for a smaller mass.
+    """
+    # shapes: lengths (K, m) [m]; data (DATA_ROWS, m)
+    platform = _platform_frequency(robot, poses, lengths) * lightness
+    if kind == d.SECOND_ORDER:
+        return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
+    if kind == d.DRUMS:  # the largest eigenvalue is at most the sum of those with one mass only
+        drums = robot.cables.axial_stiffness / (lengths.min(axis=0) * data[d.INERTIA])
+        return math.hypot(platform, math.sqrt(float(drums.max())))
+    return platform
+
+
+def _platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     """Highest angular frequency of the platform with all cables taut [rad/s]. Sag reduces this frequency."""
     # shapes: lengths (K, m) [m]
     rotation, freedom = poses.matrix, robot.freedom
@@ -329,7 +341,7 @@ def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     return float(np.sqrt(max(squares.max(), 0.0)))
 
 
-def checked_step(
+def _checked_step(
     step: float | None, integrator: int, highest: float, damping: Damping, stride: bool, waves: float = 0.0
 ) -> float:
     """Check the time step `step` [s] of a run. `highest` and `waves` are angular frequencies [rad/s]."""
@@ -356,14 +368,3 @@ def _limit(integrator: int, highest: float, damping: Damping) -> float:
     ratio = 0.5 * damping.loss_time * highest  # damping ratio at the highest frequency
     slower = math.sqrt(1.0 + ratio * ratio) - ratio
     return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
-
-
-def frequency_with_winches(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
-    """Highest angular frequency of platform and winches as a coupled system [rad/s]."""
-    # shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N]
-    if kind == d.SECOND_ORDER:
-        return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
-    if kind == d.DRUMS:  # the largest eigenvalue is at most the sum of those with one mass only
-        drums = stiffness / (lengths.min(axis=0) * data[d.INERTIA])
-        return math.hypot(platform, math.sqrt(float(drums.max())))
-    return platform

@@ -11,12 +11,7 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import brief, instance, integer, whole_number
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.simulation.initial_conditions import (
-    InitialConditions,
-    TimeTable,
-    check_set_points,
-    initial_conditions,
-)
+from sagline.dynamics.simulation.initial_conditions import InitialConditions, TimeTable, initial_conditions
 from sagline.dynamics.simulation.plant import Records, energy_error
 from sagline.dynamics.simulation.simulate import Integrator, initial_plant
 from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding
@@ -52,7 +47,7 @@ class Reading(NamedTuple):
         tension: Tensions at the frame ends [N], shape (m,).
         length: Unstrained lengths off the drums [m], shape (m,).
         force: Motor forces on the cables, positive outward [N], shape (m,); 0 without the robot's winches.
-        saturated: Nonzero for a drive at a limit of torque or speed, shape (m,).
+        saturated: Active limits of the drives, shape (m,): 0 none, 1 torque, 2 speed, 3 both.
     """
 
     counts: Array | None
@@ -225,7 +220,7 @@ class Simulator:
         """Raise an error for the first invalid set point."""
         lengths, tension, wrench = self._given
         checked(lengths, "unstrained_length", "m", above=0.0)
-        check_set_points(self._plant.robot, TimeTable.constant(lengths))
+        TimeTable.constant(lengths).check_lengths(self._plant.robot)
         if with_tension:
             checked(tension, "tension", "N")
         checked(wrench, "wrench", "N or N m")

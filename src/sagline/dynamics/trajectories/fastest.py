@@ -147,7 +147,7 @@ def _fastest_motion(robot: Robot, segment: RestToRestSegment, curve: Curve, limi
     balances, speeds = profiles.ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
     bounds, least = speeds(place), np.inf
     for _ in range(_ITERATIONS):
-        profile = profiles.fastest_speed_profile(place, balances.half_planes().joined(bounds))
+        profile = profiles.SpeedProfile.fastest(place, balances.half_planes().joined(bounds))
         if profile is None:
             raise _infeasible_error(f"{where} in motion", rest)
         before, least = least, profile.duration
@@ -156,7 +156,7 @@ def _fastest_motion(robot: Robot, segment: RestToRestSegment, curve: Curve, limi
         balances = balances.near_motion(profile.motion)
     motion: profiles.SpeedProfile | profiles.JerkProfile | None = profile
     if np.isfinite(limits).any():
-        motion = profiles.fastest_jerk_profile(curve, robot, speeds, limits, least)
+        motion = profiles.JerkProfile.fastest(curve, robot, speeds, limits, least)
     if motion is None:
         raise _infeasible_error(f"{where} in motion", rest)
     return motion, _factor(robot, segment, curve, motion, limits)

@@ -137,6 +137,32 @@ class SpeedProfile:
     square: Array  # squared speeds at the parameters, shape (K,)
     time: Array  # times of the positions [s], shape (K,)
 
+    @classmethod
+    def fastest(cls, place: Array, planes: HalfPlanes) -> SpeedProfile | None:
+        """Rest-to-rest profile with the largest feasible speed at each position `place` (K,)."""
+        # The backward pass computes the squared speeds from which the end can be reached. The forward pass uses the
+        # largest acceleration within these speeds. A bound that is satisfied at both ends of a step is also satisfied
+        # within the step, except for a small error due to the curvature of the bound. Source: Pham & Pham, A new
+        # approach to time-optimal path parameterization based on reachability analysis, 2018
+        steps, last = np.diff(place), len(place) - 1
+        reach = np.zeros((len(place), 2))
+        for i in range(last - 1, -1, -1):
+            reach[i] = _range(*_rows(planes, i, steps[i], reach[i + 1]))
+            if not reach[i, 0] <= reach[i, 1]:
+                return None
+        if reach[0, 0] > 0.0:
+            return None
+        square = np.zeros(len(place))
+        for i in range(last):
+            rates, bound = _rows(planes, i, steps[i], reach[i + 1])
+            rising = rates[:, 0] > _FLAT * np.abs(rates[:, 0]).max()
+            most = np.min((bound - rates[:, 1] * square[i])[rising] / rates[rising, 0])
+            square[i + 1] = np.clip(square[i] + 2.0 * steps[i] * most, *reach[i + 1])
+        if not (square[1:-1] > 0.0).all():
+            return None
+        speed = np.sqrt(square)
+        return cls(place, square, np.append(0.0, np.cumsum(2.0 * steps / (speed[1:] + speed[:-1]))))
+
     @property
     def duration(self) -> float:
         """Duration [s]."""
@@ -154,32 +180,6 @@ class SpeedProfile:
         since, rate, speed = time - self.time[k], self.motion[k, 0], np.sqrt(self.square[k])
         place = self.place[k] + since * (speed + 0.5 * since * rate)
         return np.stack((place, speed + since * rate, rate, np.zeros_like(place)))
-
-
-def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
-    """Rest-to-rest profile with the largest feasible speed at each position `place` (K,)."""
-    # The backward pass computes the squared speeds from which the end can be reached. The forward pass uses the largest
-    # acceleration within these speeds. A bound that is satisfied at both ends of a step is also satisfied within the
-    # step, except for a small error due to the curvature of the bound. Source: Pham & Pham, A new approach to
-    # time-optimal path parameterization based on reachability analysis, 2018
-    steps, last = np.diff(place), len(place) - 1
-    reach = np.zeros((len(place), 2))
-    for i in range(last - 1, -1, -1):
-        reach[i] = _range(*_rows(planes, i, steps[i], reach[i + 1]))
-        if not reach[i, 0] <= reach[i, 1]:
-            return None
-    if reach[0, 0] > 0.0:
-        return None
-    square = np.zeros(len(place))
-    for i in range(last):
-        rates, bound = _rows(planes, i, steps[i], reach[i + 1])
-        rising = rates[:, 0] > _FLAT * np.abs(rates[:, 0]).max()
-        most = np.min((bound - rates[:, 1] * square[i])[rising] / rates[rising, 0])
-        square[i + 1] = np.clip(square[i] + 2.0 * steps[i] * most, *reach[i + 1])
-    if not (square[1:-1] > 0.0).all():
-        return None
-    speed = np.sqrt(square)
-    return SpeedProfile(place, square, np.append(0.0, np.cumsum(2.0 * steps / (speed[1:] + speed[:-1]))))
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
@@ -225,6 +225,49 @@ class JerkProfile:
     jerk: Array  # third derivative of the parameter with respect to normalized time, shape (P,)
     duration: float  # the time [s]
 
+    @classmethod
+    def fastest(
+        cls, curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
+    ) -> JerkProfile | None:
+        """The fastest rest-to-rest profile that was found within tension limits and jerk bounds."""
+        # The problem is linear in the jerk and in the squared time, except for three quantities: the position at each
+        # share of the time, the squared speed at this position, and the third power of the time. Each iteration updates
+        # these quantities and solves a linear program. Units: limits [m/s^3]; least [s]
+        from scipy.optimize import linprog  # this import takes longer than the rest of dynamics
+
+        course = _first(curve, limits, least)
+        state = _integration_matrices(PIECES)
+        jet = curve.at(np.clip(state[0] @ course.jerk, 0.0, 1.0))
+        balances = ForceBalance.at(robot, jet, inverse(robot, jet.pose))
+        ends = np.hstack((state[:, -1], np.zeros((3, 1))))
+        cost = np.append(np.zeros(PIECES), 1.0)
+        for _ in range(_ITERATIONS):
+            place, speed, rate = state @ course.jerk
+            square = course.duration**2
+            jet = curve.at(np.clip(place, 0.0, 1.0))
+            balances = balances.at_poses(jet).near_motion(np.stack((rate, speed**2), axis=1) / square)
+            planes = _without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
+            rows, bounds = zip(
+                _within(planes, state, speed),
+                (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # no backward motion
+                *(
+                    _jerk_rows(jet.rates[..., part], state, course, limit)
+                    for part, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True)
+                    if np.isfinite(limit)
+                ),
+                strict=True,
+            )
+            between = [(None, None)] * PIECES + [(0.5 * square, None)]
+            found = linprog(
+                cost, np.vstack(rows), np.concatenate(bounds), ends, [1.0, 0.0, 0.0], between, method="highs"
+            )
+            if found.x is None:
+                return None
+            before, course = course, cls(found.x[:-1], float(np.sqrt(found.x[-1])))
+            if abs(course.duration - before.duration) <= _CONVERGED * course.duration:
+                break
+        return course
+
     def at(self, time: Array) -> Array:
         """Parameter and its first three time derivatives, shape (4, N)."""
         state = _integration_matrices(len(self.jerk)) @ self.jerk  # at the knots
@@ -249,47 +292,6 @@ def _integration_matrices(pieces: int) -> Array:
     since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h
     left = np.maximum(since - h, 0.0)  # time from the knot to the end of each piece
     return np.stack([(since**k - left**k) / f for k, f in ((3, 6.0), (2, 2.0), (1, 1.0))])
-
-
-def fastest_jerk_profile(
-    curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
-) -> JerkProfile | None:
-    """The fastest rest-to-rest profile that was found within tension limits and jerk bounds."""
-    # The problem is linear in the jerk and in the squared time, except for three quantities: the position at each share
-    # of the time, the squared speed at this position, and the third power of the time. Each iteration updates these
-    # quantities and solves a linear program. Units: limits [m/s^3]; least [s]
-    from scipy.optimize import linprog  # this import takes longer than the rest of dynamics
-
-    course = _first(curve, limits, least)
-    state = _integration_matrices(PIECES)
-    jet = curve.at(np.clip(state[0] @ course.jerk, 0.0, 1.0))
-    balances = ForceBalance.at(robot, jet, inverse(robot, jet.pose))
-    ends = np.hstack((state[:, -1], np.zeros((3, 1))))
-    cost = np.append(np.zeros(PIECES), 1.0)
-    for _ in range(_ITERATIONS):
-        place, speed, rate = state @ course.jerk
-        square = course.duration**2
-        jet = curve.at(np.clip(place, 0.0, 1.0))
-        balances = balances.at_poses(jet).near_motion(np.stack((rate, speed**2), axis=1) / square)
-        planes = _without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
-        rows, bounds = zip(
-            _within(planes, state, speed),
-            (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # no backward motion
-            *(
-                _jerk_rows(jet.rates[..., part], state, course, limit)
-                for part, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True)
-                if np.isfinite(limit)
-            ),
-            strict=True,
-        )
-        between = [(None, None)] * PIECES + [(0.5 * square, None)]
-        found = linprog(cost, np.vstack(rows), np.concatenate(bounds), ends, [1.0, 0.0, 0.0], between, method="highs")
-        if found.x is None:
-            return None
-        before, course = course, JerkProfile(found.x[:-1], float(np.sqrt(found.x[-1])))
-        if abs(course.duration - before.duration) <= _CONVERGED * course.duration:
-            break
-    return course
 
 
 def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfile:

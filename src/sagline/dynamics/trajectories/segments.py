@@ -76,14 +76,14 @@ class _LineCurve:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SplineCurve:
+class _SplineCurve:
     """Curve through samples: 5th-degree splines of position and quaternion over its arc length."""
 
     position: Any  # spline of the position
     quaternion: Any  # spline of a quaternion, not necessarily of unit length
 
     @classmethod
-    def through(cls, pose: Pose, parameter: Array) -> SplineCurve:
+    def through(cls, pose: Pose, parameter: Array) -> _SplineCurve:
         """Splines through poses at ascending parameters. Poses with nearly the same parameter are left out."""
         from scipy.interpolate import make_interp_spline  # this import takes longer than the rest of motion
 
@@ -257,7 +257,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
             return line, values
     way = _arc_lengths(time, *rates[:2])
     way /= way[0, -1]
-    return SplineCurve.through(pose, way[0]), way
+    return _SplineCurve.through(pose, way[0]), way
 
 
 def sample_time(path: Path) -> float:

@@ -56,42 +56,6 @@ def _integrals(weights: Array, values: Array) -> Array:
 _TINY = 1e-300
 
 
-class CableComponents(NamedTuple):
-    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first."""
-
-    square: Array  # squared angular frequencies [1/s^2], shape (T,)
-    cable: Indices  # cable index of each mode, shape (T,)
-    participation: Array  # modal force per acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)]
-    still: Array  # M_0, mass of every cable for quasi-static motion of its end, world axes, shape (m, 3, 3) [kg]
-    plane: PlaneModes  # modes in the cables' planes, grouped by cable
-    normal: PlaneModes  # modes normal to the planes
-    mesh: StringMesh  # nodes of the modes
-
-    def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[PlaneModes, Array, Array], ...]:
-        """In-plane modes and normal modes, each with the part of K motions that belongs to it."""
-        # shapes: ends (m, 3, K), world axes; amplitudes (T, K). returns for both: modes; displacements of the platform
-        # ends along their directions (t, d, K); amplitudes (t, k, K)
-        own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
-        swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])
-        sway = amplitudes[inside:].reshape(*self.normal.square.shape, ends.shape[2])
-        return (self.plane, own[:, ::2], swing), (self.normal, own[:, 1:2], sway)
-
-
-class StringMesh(NamedTuple):
-    """Nodes of the taut cables."""
-
-    taut: Indices  # indices of the cables, t of them
-    table: Array  # rows of these cables in the table of strings, shape (t, STRING_COLUMNS)
-    axes: Array  # horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3)
-    omega: float  # highest angular frequency for which the nodes are dense enough [rad/s]
-    points: Array  # material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6)
-
-    @property
-    def density(self) -> Array:
-        """Linear density of the cables [kg/m], shape (t,)."""
-        return np.asarray(self.table[:, columns.DENSITY])
-
-
 class PlaneModes(NamedTuple):
     """Modes of the taut cables, either in the plane or normal to the plane, k modes per cable."""
 
@@ -102,33 +66,111 @@ class PlaneModes(NamedTuple):
     drive: Array  # modal force per acceleration of the platform end, shape (t, k, d)
 
 
-def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents:
-    """Cable modes of one state. Modes up to `up_to` [Hz] are accurate. Higher modes only complete the basis."""
-    # units: up_to [Hz]
-    omega = 2.0 * np.pi * up_to
-    taut = np.flatnonzero(strings.taut[row])
-    table, axes = np.ascontiguousarray(strings.table[row, taut]), strings.axes[row, taut]
-    counts = np.empty(taut.size, dtype=np.int64)
-    spectral.node_counts(table, omega, counts)
-    t, n = taut.size, int(counts.max(initial=2))
-    points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
-    plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
-    spectral.spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
-    free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is fixed
-    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
-    inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
-    aside = _motions(normal, carried[:, :, 4:], free, first)
-    swings = inside.drive @ axes[:, ::2]
-    sways = aside.drive @ axes[:, 1:2]
-    return CableComponents(
-        np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1))),
-        np.concatenate((np.repeat(taut, inside.square.shape[1]), np.repeat(taut, aside.square.shape[1]))),
-        np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3))),
-        _still(mass, axes, taut, strings.taut.shape[1]),
-        inside,
-        aside,
-        StringMesh(taut, table, axes, omega, points),
-    )
+class CableComponents(NamedTuple):
+    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first."""
+
+    square: Array  # squared angular frequencies [1/s^2], shape (T,)
+    cable: Indices  # cable index of each mode, shape (T,)
+    participation: Array  # modal force per acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)]
+    still: Array  # M_0, mass of every cable for quasi-static motion of its end, world axes, shape (m, 3, 3) [kg]
+    plane: PlaneModes  # modes in the cables' planes, grouped by cable
+    normal: PlaneModes  # modes normal to the planes
+    taut: Indices  # indices of the taut cables, shape (t,)
+    table: Array  # rows of the taut cables in the table of strings, shape (t, STRING_COLUMNS)
+    axes: Array  # horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3)
+    omega: float  # highest angular frequency for which the nodes are dense enough [rad/s]
+    points: Array  # material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6)
+
+    @classmethod
+    def of(cls, strings: Strings, row: int, up_to: float) -> CableComponents:
+        """Cable modes of one state. Modes up to `up_to` [Hz] are accurate. Higher modes only complete the basis."""
+        # units: up_to [Hz]
+        omega = 2.0 * np.pi * up_to
+        taut = np.flatnonzero(strings.taut[row])
+        table, axes = np.ascontiguousarray(strings.table[row, taut]), strings.axes[row, taut]
+        counts = np.empty(taut.size, dtype=np.int64)
+        spectral.node_counts(table, omega, counts)
+        t, n = taut.size, int(counts.max(initial=2))
+        points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
+        plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
+        spectral.spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
+        free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is fixed
+        first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
+        inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
+        aside = _motions(normal, carried[:, :, 4:], free, first)
+        swings = inside.drive @ axes[:, ::2]
+        sways = aside.drive @ axes[:, 1:2]
+        return cls(
+            np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1))),
+            np.concatenate((np.repeat(taut, inside.square.shape[1]), np.repeat(taut, aside.square.shape[1]))),
+            np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3))),
+            _still(mass, axes, taut, strings.taut.shape[1]),
+            inside,
+            aside,
+            taut,
+            table,
+            axes,
+            omega,
+            points,
+        )
+
+    @property
+    def density(self) -> Array:
+        """Linear density of the taut cables [kg/m], shape (t,)."""
+        return np.asarray(self.table[:, columns.DENSITY])
+
+    def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[PlaneModes, Array, Array], ...]:
+        """In-plane modes and normal modes, each with the part of K motions that belongs to it."""
+        # shapes: ends (m, 3, K), world axes; amplitudes (T, K). returns for both: modes; displacements of the platform
+        # ends along their directions (t, d, K); amplitudes (t, k, K)
+        own, inside = self.axes @ ends[self.taut], self.plane.square.size
+        swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])
+        sway = amplitudes[inside:].reshape(*self.normal.square.shape, ends.shape[2])
+        return (self.plane, own[:, ::2], swing), (self.normal, own[:, 1:2], sway)
+
+    def _node_motion(self, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
+        """Displacements of the nodes in the cables' planes and normal to them, times the root of the node's mass."""
+        # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
+        plane, normal = (
+            motions.rest @ end + motions.shape @ given for motions, end, given in self.planes(ends, amplitudes)
+        )
+        return plane, normal
+
+    def shapes(self, ends: Array, amplitudes: Array, count: int) -> Array:
+        """Displacements of all cables at equally spaced material points, frame end first, (K, m, count, 3)."""
+        t, n, k = self.taut.size, self.points.shape[1], ends.shape[2]
+        values = np.empty((t, count, n))
+        spectral.interpolate(self.table, self.omega, _lobatto(), self.points, values)
+        plane, normal = self._node_motion(ends, amplitudes)
+        inside = plane.reshape(t, n, 2, k)
+        behind = self.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
+        slide = np.hypot(*behind.T)  # an elastic frame end has one motion in the plane
+        inside[:, 0] = (behind / np.maximum(slide, _TINY)[:, None])[:, :, None] * inside[:, 0, :1]
+        own = np.concatenate((inside, normal[:, :, None]), axis=2)
+        turned = np.swapaxes(self.axes[:, None, [0, 2, 1]], -1, -2) @ own
+        shapes = (values @ turned.reshape(t, n, 3 * k)).reshape(t, count, 3, k)
+        if t < ends.shape[0]:
+            moved, shapes = shapes, np.zeros((ends.shape[0], count, 3, k))
+            shapes[self.taut] = moved
+        return np.moveaxis(shapes, -1, 0)
+
+    def stretch_energy(self, ends: Array, amplitudes: Array) -> Array:
+        """Twice the stretch energy of each cable in each mode of unit modal mass, (t, K) [1/s^2]."""
+        plane, _ = self._node_motion(ends, amplitudes)
+        return np.asarray(np.einsum("tik,tik->tk", plane, self._stretch_matrices() @ plane))
+
+    def stretch_stiffness(self) -> Array:
+        """Stretch stiffness matrix of the quasi-static displacements of the platform end and the in-plane modes."""
+        # returns (t, 2 + k, 2 + k)
+        motions = self.plane
+        basis = np.concatenate((motions.rest, motions.shape), axis=2)
+        return np.asarray(np.swapaxes(basis, -1, -2) @ self._stretch_matrices() @ basis)
+
+    def _stretch_matrices(self) -> Array:
+        n = self.points.shape[1]
+        matrices = np.empty((self.taut.size, 2 * n, 2 * n))
+        spectral.stretch_matrices(self.table, self.omega, _lobatto(), self.points, matrices)
+        return matrices
 
 
 def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
@@ -148,53 +190,3 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
     still = np.zeros((count, 3, 3))
     still[taut] = np.swapaxes(axes, -1, -2) @ own @ axes
     return still
-
-
-def _node_motion(components: CableComponents, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
-    """Displacements of the nodes in the cables' planes, then normal to them, both times the root of the node's mass."""
-    # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
-    plane, normal = (
-        motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
-    )
-    return plane, normal
-
-
-def cable_shapes(components: CableComponents, ends: Array, amplitudes: Array, count: int) -> Array:
-    """Displacements of all cables at equally spaced material points, frame end first, (K, m, count, 3)."""
-    mesh = components.mesh
-    t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
-    values = np.empty((t, count, n))
-    spectral.interpolate(mesh.table, mesh.omega, _lobatto(), mesh.points, values)
-    plane, normal = _node_motion(components, ends, amplitudes)
-    inside = plane.reshape(t, n, 2, k)
-    behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
-    slide = np.hypot(*behind.T)  # an elastic frame end has one motion in the plane
-    inside[:, 0] = (behind / np.maximum(slide, _TINY)[:, None])[:, :, None] * inside[:, 0, :1]
-    own = np.concatenate((inside, normal[:, :, None]), axis=2)
-    turned = np.swapaxes(mesh.axes[:, None, [0, 2, 1]], -1, -2) @ own
-    shapes = (values @ turned.reshape(t, n, 3 * k)).reshape(t, count, 3, k)
-    if t < ends.shape[0]:
-        moved, shapes = shapes, np.zeros((ends.shape[0], count, 3, k))
-        shapes[mesh.taut] = moved
-    return np.moveaxis(shapes, -1, 0)
-
-
-def stretch_energy(components: CableComponents, ends: Array, amplitudes: Array) -> Array:
-    """Twice the stretch energy of each cable in each mode of unit modal mass, (t, K) [1/s^2]."""
-    plane, _ = _node_motion(components, ends, amplitudes)
-    return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
-
-
-def stretch_stiffness(components: CableComponents) -> Array:
-    """Stretch stiffness matrix of the quasi-static displacements of the platform end and the in-plane modes."""
-    # returns (t, 2 + k, 2 + k)
-    motions = components.plane
-    basis = np.concatenate((motions.rest, motions.shape), axis=2)
-    return np.asarray(np.swapaxes(basis, -1, -2) @ _stretch_matrices(components.mesh) @ basis)
-
-
-def _stretch_matrices(mesh: StringMesh) -> Array:
-    n = mesh.points.shape[1]
-    matrices = np.empty((mesh.taut.size, 2 * n, 2 * n))
-    spectral.stretch_matrices(mesh.table, mesh.omega, _lobatto(), mesh.points, matrices)
-    return matrices

@@ -14,15 +14,8 @@ from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result, Saved
 from sagline.core.table import Columns, Tabular
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model
-from sagline.dynamics.vibration.response import Receptance, coupled_receptance, modal_receptance, peak_receptance
-from sagline.dynamics.vibration.robot_modes import (
-    VibrationModel,
-    cable_shares,
-    damping_ratios,
-    massless_modes,
-    state_modes,
-    vibration_model,
-)
+from sagline.dynamics.vibration.response import Receptance, modal_receptance, peak_receptance
+from sagline.dynamics.vibration.robot_modes import VibrationModel, state_modes
 from sagline.dynamics.vibration.vibration import UP_TO, VibrationStatus
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
@@ -136,7 +129,7 @@ def frequency_map(
     found = np.full((5, len(poses)), np.nan)
     for part in blocks(len(poses), BLOCK, report):
         own = state[part]
-        model = vibration_model(own)
+        model = VibrationModel.of(own)
         for k in range(len(own)):
             index = part.start + k
             status[index], lowest = _status(model, k)
@@ -153,7 +146,7 @@ def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
     """Status of the pose `row`, and the lowest frequency with massless cables [Hz]."""
     if np.isnan(model.stiffness[row]).any():
         return VibrationStatus.NO_LENGTHS, np.nan
-    frequency, leaving = massless_modes(model, row)
+    frequency, leaving = model.massless_modes(row)
     if leaving.shape[1]:
         return VibrationStatus.UNSTABLE, np.nan
     taut = model.strings.taut[row].all()
@@ -173,9 +166,9 @@ def _numbers_of_pose(
     receptance = modal_receptance(found, rest, damping.modal_damping)
     if damping.loss_time > 0.0 or damping.air_damping > 0.0:
         slopes = cable_slopes(state[row])
-        receptance = coupled_receptance(Receptance(model.at(row), slopes.matrix, slopes.blocks, damping), up_to)
-    shares = cable_shares(model, row, found) if damping.air_damping > 0.0 else np.zeros((0, found.number))
-    ratios = damping_ratios(state.one_robot.cables.linear_density[: len(shares)], found, shares, damping)
+        receptance = Receptance(model.at(row), slopes.matrix, slopes.blocks, damping).coupled(up_to)
+    shares = found.cable_shares() if damping.air_damping > 0.0 else np.zeros((0, found.number))
+    ratios = found.damping_ratios(state.one_robot.cables.linear_density[: len(shares)], shares, damping)
     peak, at = peak_receptance(receptance, found.frequency, ratios, damping)
     return float(found.frequency[0]), lowest, float(first @ model.mass[row] @ first), peak, at
 

@@ -13,14 +13,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import check_model, check_solved, single_state
 from sagline.dynamics.vibration.flexibility import Flexibility, flexibility
-from sagline.dynamics.vibration.mode_sensitivities import (
-    ModeGroup,
-    StateSlopes,
-    mode_group,
-    square_derivatives,
-    state_slopes,
-    string_data,
-)
+from sagline.dynamics.vibration.mode_sensitivities import ModeGroup, StateSlopes, mode_groups
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of, of_result
 from sagline.statics.stiffness import modes
@@ -112,7 +105,7 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
     groups = list(_groups(found.frequency, together))
     squares = (float((2.0 * np.pi * found.frequency[k].mean()) ** 2) for k in groups)
     swings = (_massless(rest, flexible, found.shape[:, k], square) for k, square in zip(groups, squares, strict=True))
-    return _result(state, False, found.frequency, groups, [square_derivatives(rest, one) for one in swings])
+    return _result(state, False, found.frequency, groups, [one.square_derivatives(rest) for one in swings])
 
 
 def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
@@ -120,8 +113,8 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
         told = f"a vibration with the status {vibration.status.name}"
         raise InvalidValueError("state", told, "a vibration that was solved", "Use its state for massless frequencies.")
     rest = _rest(vibration.state)
-    cables, groups = string_data(rest), list(_groups(vibration.frequency, together))
-    slopes = [square_derivatives(rest, mode_group(rest, cables, vibration.frequency[group])) for group in groups]
+    groups = list(_groups(vibration.frequency, together))
+    slopes = [one.square_derivatives(rest) for one in mode_groups(rest, vibration.frequency, groups)]
     return _result(vibration.state, True, vibration.frequency, groups, slopes)
 
 
@@ -131,7 +124,7 @@ def _rest(state: Equilibrium) -> StateSlopes:
         value, allowed = "a robot with pulleys or dead length", "cables from frame anchors"
         raise InvalidValueError("state", value, allowed, "Use the robot without winches: robot.replace(winches=None).")
     check_solved(state)
-    return state_slopes(state)
+    return StateSlopes.of(state)
 
 
 def _groups(frequency: Array, together: float) -> Iterator[Indices]:

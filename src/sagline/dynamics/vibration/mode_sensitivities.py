@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.dynamics.collocation import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.kernels.dynamics.string import SMOOTH, TINY
 from sagline.robot.equilibrium import Equilibrium
@@ -25,6 +26,14 @@ class StateSlopes(NamedTuple):
     compliance: Array  # shape (6, 6)
     mass: Array  # mass matrix of the platform, shape (6, 6)
 
+    @classmethod
+    def of(cls, state: Equilibrium) -> StateSlopes:
+        """Compute force derivatives, compliance and mass of a state."""
+        slopes, known = cable_slopes(state), stiffness(state)
+        by_datum = np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness))
+        settling = np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity))
+        return cls(state, slopes, by_datum, settling, known.compliance, mass_matrix(state))
+
 
 class ModeGroup(NamedTuple):
     """The g modes of one frequency, and the effect of changes of cable data on each pair of modes."""
@@ -36,35 +45,26 @@ class ModeGroup(NamedTuple):
     # derivatives with respect to length, linear density (including the derivative of mu u^2) and axial stiffness
     by_datum: Array  # shape (3, m, g, g)
 
-
-def state_slopes(state: Equilibrium) -> StateSlopes:
-    """Compute force derivatives, compliance and mass of a state."""
-    slopes, known = cable_slopes(state), stiffness(state)
-    by_datum = np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness))
-    settling = np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity))
-    return StateSlopes(state, slopes, by_datum, settling, known.compliance, mass_matrix(state))
-
-
-def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> dict[str, Array]:
-    """Matrices (..., g, g) by the fields of `FrequencySlopes`; their eigenvalues are derivatives of omega squared."""
-    # the derivatives include the motion of the platform to its new equilibrium
-    robot, pose = rest.state.one_robot, _by_pose(rest, swings)
-    turns = rest.state.pose.matrix.T @ swings.motion[3:]
-    spins = np.einsum("ia,jb->ijab", turns, turns)
-    moved = swings.motion[:3]
-    own = -np.einsum("mabc,pmc->pmab", swings.by_force, rest.by_datum) - swings.by_datum
-    own = own + _lever_form(swings.motion[3:], rest.slopes.levers, rest.by_datum)
-    sink = -robot.gravity * rest.compliance[:, 2]
-    length, density, stiff = own + np.einsum("kab,pkm->pmab", pose, rest.settling)
-    return {
-        "length_sensitivity": length,
-        "density_sensitivity": density,
-        "stiffness_sensitivity": stiff,
-        "mass_sensitivity": np.einsum("kab,k->ab", pose, sink) - swings.square * moved.T @ moved,
-        "inertia_sensitivity": -0.5 * swings.square * (spins + np.swapaxes(spins, -1, -2)),
-        "pose_sensitivity": pose,
-        "wrench_sensitivity": np.einsum("kab,kj->jab", pose, rest.compliance),
-    }
+    def square_derivatives(self, rest: StateSlopes) -> dict[str, Array]:
+        """Matrices (..., g, g) by fields of `FrequencySlopes`; their eigenvalues are derivatives of omega squared."""
+        # the derivatives include the motion of the platform to its new equilibrium
+        robot, pose = rest.state.one_robot, _by_pose(rest, self)
+        turns = rest.state.pose.matrix.T @ self.motion[3:]
+        spins = np.einsum("ia,jb->ijab", turns, turns)
+        moved = self.motion[:3]
+        own = -np.einsum("mabc,pmc->pmab", self.by_force, rest.by_datum) - self.by_datum
+        own = own + _lever_form(self.motion[3:], rest.slopes.levers, rest.by_datum)
+        sink = -robot.gravity * rest.compliance[:, 2]
+        length, density, stiff = own + np.einsum("kab,pkm->pmab", pose, rest.settling)
+        return {
+            "length_sensitivity": length,
+            "density_sensitivity": density,
+            "stiffness_sensitivity": stiff,
+            "mass_sensitivity": np.einsum("kab,k->ab", pose, sink) - self.square * moved.T @ moved,
+            "inertia_sensitivity": -0.5 * self.square * (spins + np.swapaxes(spins, -1, -2)),
+            "pose_sensitivity": pose,
+            "wrench_sensitivity": np.einsum("kab,kj->jab", pose, rest.compliance),
+        }
 
 
 def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
@@ -105,7 +105,7 @@ CLOSE = 1e-5  # relative step of the frequency for the numerical derivative of t
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-class StringData(NamedTuple):
+class _StringData(NamedTuple):
     """Cable at rest: force on its platform end (3,) [N], weight per length, length, EA and density."""
 
     force: Array
@@ -126,7 +126,7 @@ class _Waves(NamedTuple):
     end: Array  # displacement and force at the platform end, shape (2, 3, 3)
 
 
-def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
+def _string_data(rest: StateSlopes) -> tuple[_StringData, ...]:
     """String data of the cables of the state `rest`."""
     cables = rest.state.cables
     gravity = 0.0 if cables.model.weightless else cables.gravity
@@ -134,12 +134,18 @@ def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
         np.broadcast_to(field, cables.shape) for field in (cables.cable.linear_density, cables.cable.axial_stiffness)
     )
     return tuple(
-        StringData(rest.slopes.force[i], gravity * float(density[i]), length, float(stiffness[i]), float(density[i]))
+        _StringData(rest.slopes.force[i], gravity * float(density[i]), length, float(stiffness[i]), float(density[i]))
         for i, length in enumerate(cables.unstrained_length.tolist())
     )
 
 
-def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Array) -> ModeGroup:
+def mode_groups(rest: StateSlopes, frequency: Array, groups: list[Indices]) -> Iterator[ModeGroup]:
+    """Modes of each group of adjacent frequencies that count as equal; `frequency` [Hz] of all modes."""
+    cables = _string_data(rest)
+    return (_mode_group(rest, cables, frequency[group]) for group in groups)
+
+
+def _mode_group(rest: StateSlopes, cables: tuple[_StringData, ...], frequency: Array) -> ModeGroup:
     """Modes of the adjacent frequencies `frequency` [Hz], which count as equal."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
     omega *= 1.0 + _correction(rest, cables, omega, group)  # this step multiplies the error by the factor CLOSE
@@ -157,7 +163,7 @@ def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Arr
     return _forms(rest, cables, waves, motion @ units, pulls @ units, omega)
 
 
-def _correction(rest: StateSlopes, cables: tuple[StringData, ...], omega: float, group: int) -> float:
+def _correction(rest: StateSlopes, cables: tuple[_StringData, ...], omega: float, group: int) -> float:
     """Relative error of a frequency, to first order, from the singular values of the equations."""
     matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
     near = omega * (1.0 + CLOSE)
@@ -187,7 +193,7 @@ def _equations(rest: StateSlopes, waves: list[_Waves], omega: float, scale: Arra
     return matrix * scale, scale
 
 
-def _waves(cable: StringData, omega: float) -> _Waves:
+def _waves(cable: _StringData, omega: float) -> _Waves:
     """Waves of a cable due to unit forces on its frame end, by collocation at Gauss points of its elements."""
     edges = _edges(cable, omega)
     size = np.diff(edges)
@@ -220,7 +226,7 @@ def _flexible(force: Array, stiffness: float) -> Array:
     return found
 
 
-def _edges(cable: StringData, omega: float) -> Array:
+def _edges(cable: _StringData, omega: float) -> Array:
     """Borders of the elements of a cable. Each element is short compared with N/w and with a transverse wave."""
     edges = np.array([0.0, cable.length])
     for _ in range(HALVINGS):
@@ -232,7 +238,7 @@ def _edges(cable: StringData, omega: float) -> Array:
     return edges
 
 
-def _longest(cable: StringData, omega: float, start: Array, end: Array) -> Array:
+def _longest(cable: _StringData, omega: float, start: Array, end: Array) -> Array:
     """Largest allowed element lengths [m] in the parts of a cable from `start` to `end`."""
     low, high = (cable.force[2] - cable.weight * (cable.length - s) for s in (start, end))
     least = np.hypot(np.hypot(*cable.force[:2]), np.maximum(np.maximum(low, -high), 0.0)) + TINY
@@ -241,7 +247,7 @@ def _longest(cable: StringData, omega: float, start: Array, end: Array) -> Array
 
 
 def _forms(
-    rest: StateSlopes, cables: tuple[StringData, ...], waves: list[_Waves], motion: Array, pulls: Array, omega: float
+    rest: StateSlopes, cables: tuple[_StringData, ...], waves: list[_Waves], motion: Array, pulls: Array, omega: float
 ) -> ModeGroup:
     gravity = 0.0 if rest.state.cables.model.weightless else rest.state.cables.gravity
     end_force, by_force, by_datum = [], [], []

@@ -18,7 +18,7 @@ from sagline.core.progress import blocks
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.dynamics.vibration import robot_modes
-from sagline.dynamics.vibration.component_modes import CableComponents, PlaneModes, component_modes, stretch_stiffness
+from sagline.dynamics.vibration.component_modes import CableComponents, PlaneModes
 from sagline.dynamics.vibration.dynamic_stiffness import (
     Complex,
     Damping,
@@ -53,8 +53,8 @@ class Receptance(NamedTuple):
 
     def fixed_end_modes(self, up_to: float) -> FixedEndModes:
         """Fixed-end modes of the cables up to the frequency `up_to` [Hz]."""
-        components = component_modes(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
-        return components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None
+        components = CableComponents.of(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
+        return components, components.stretch_stiffness() if self.damping.loss_time > 0.0 else None
 
     def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
         """Two compliances: with cable mass, computed from the modes of the cables, and with massless cables."""
@@ -74,6 +74,11 @@ class Receptance(NamedTuple):
         moving[:, ~strings.taut[0]] = 0.0
         return self._compliance(frequency, moving)
 
+    def coupled(self, up_to: float) -> ForceReceptance:
+        """Function that computes the receptance up to the frequency `up_to` [Hz], for losses that couple the modes."""
+        held = self.fixed_end_modes(up_to)
+        return lambda frequency: self.by_modes(frequency, held)[0][:, :3, :3]
+
     def _compliance(self, frequency: Array, moving: Complex) -> Complex:
         """Compliance: inverse of the dynamic stiffness. `moving` (F, m, 3, 3): dynamic part of cables' stiffness."""
         model, omega = self.model, 2.0 * np.pi * frequency[:, None, None]
@@ -85,22 +90,24 @@ class Receptance(NamedTuple):
 
     def _moving(self, components: CableComponents, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
         """Dynamic part of the cables' stiffness: first with cable mass, then without, (F, m, 3, 3) each."""
-        mesh, model = components.mesh, self.model
-        density = mesh.density[:, None, None]
+        model = self.model
+        density = components.density[:, None, None]
         square = omega**2 - 1j * omega * self.damping.air_damping / density[:, 0]  # (t, F)
         loss = 1.0 + 2j * self.damping.modal_damping
         moving = np.zeros((omega.size, model.strings.taut.shape[1], 3, 3), dtype=np.complex128)
         still = np.zeros_like(moving)
-        moving[:, mesh.taut] = -np.swapaxes(square, 0, 1)[..., None, None] * components.still[mesh.taut]
+        moving[:, components.taut] = -np.swapaxes(square, 0, 1)[..., None, None] * components.still[components.taut]
         aside = _driven_stiffness(components.normal, square, loss)
         if lost is None:
             inside = _driven_stiffness(components.plane, square, loss)
         else:
             scaled = np.asarray(1j * loss * self.damping.loss_time * omega, dtype=np.complex128)
             inside, bare = _driven_stiffness_with_loss(components.plane, square, loss, lost, scaled)
-            still[:, mesh.taut] = _in_world(bare, mesh.axes[:, ::2])
+            still[:, components.taut] = _in_world(bare, components.axes[:, ::2])
             inside += bare
-        moving[:, mesh.taut] += _in_world(inside, mesh.axes[:, ::2]) + _in_world(aside, mesh.axes[:, 1:2])
+        moving[:, components.taut] += _in_world(inside, components.axes[:, ::2]) + _in_world(
+            aside, components.axes[:, 1:2]
+        )
         return moving, still
 
 
@@ -155,12 +162,6 @@ def modal_receptance(found: robot_modes.StateModes, rest: Array, ratio: float) -
         return np.asarray(beyond + (terms @ products.T).reshape(-1, 3, 3))
 
     return receptance
-
-
-def coupled_receptance(receptance: Receptance, up_to: float) -> ForceReceptance:
-    """Function that computes the receptance up to the frequency `up_to` [Hz], for losses that couple the modes."""
-    held = receptance.fixed_end_modes(up_to)
-    return lambda frequency: receptance.by_modes(frequency, held)[0][:, :3, :3]
 
 
 def peak_receptance(
@@ -274,11 +275,11 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
         raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give at least one.")
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Split them into parts.")
     known = optional(damping, Damping, "damping") or Damping()
-    model = robot_modes.vibration_model(state)
+    model = robot_modes.VibrationModel.of(state)
     check_solved(state)
     highest = float(given.max())
     robot_modes.check_mode_count(robot_modes.modes_below(model, 0, max(highest, LOWEST)), highest, "frequency")
-    if robot_modes.massless_modes(model, 0)[1].shape[1]:
+    if model.massless_modes(0)[1].shape[1]:
         step = "Simulate it; vibration() names the unstable directions."
         raise InvalidValueError("state", "an unstable equilibrium", "a stable equilibrium, which has a response", step)
     slopes = cable_slopes(state)
@@ -307,35 +308,35 @@ class ResponseCurves(NamedTuple):
     static: float  # motion per static force
     unit: str  # unit of all responses
 
+    @classmethod
+    def of_vibration(cls, vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
+        """Component `motion` of the motion per `force` at the center of mass, up to the limit of the modes."""
+        # Both curves are from `frequency_response`. The massless curve has no air damping, which acts only on cables
+        # with mass
+        state = instance(vibration, Vibration, "vibration").state
+        if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
+            reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
+            raise InvalidValueError(
+                "vibration", reason, "a stable state with modes", "Use another state or a higher up_to."
+            )
+        _places(force, motion)
+        natural = np.concatenate((vibration.frequency, modes(state).frequency))
+        found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)
+        return cls.of_response(found, force, motion)
 
-def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """Component `motion` of the platform's motion per `force` at the center of mass, up to the limit of the modes."""
-    # Both curves are from `frequency_response`. The massless curve has no air damping, which acts only on cables with
-    # mass
-    state = instance(vibration, Vibration, "vibration").state
-    if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
-        reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
-        raise InvalidValueError(
-            "vibration", reason, "a stable state with modes", "Use another state or a higher up_to."
-        )
-    _places(force, motion)
-    natural = np.concatenate((vibration.frequency, modes(state).frequency))
-    found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)
-    return curves_of_response(found, force, motion)
-
-
-def curves_of_response(response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """Curves of one element of a `FrequencyResponse`, within the range of logarithmic axes."""
-    row, column = _places(force, motion)
-    answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
-    kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
-    kept = kept[np.argsort(response.frequency[kept], kind="stable")]
-    if len(kept) < 2:
-        step = "Give more frequencies, for instance np.geomspace(0.5, 20.0, 500)."
-        raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "at least two", step)
-    static = abs(float(stiffness(response.state).compliance[row, column]))
-    with_mass, massless = (locked(receptance[kept]) for receptance in answers)
-    return ResponseCurves(locked(response.frequency[kept]), with_mass, massless, static, UNITS[row > 2, column > 2])
+    @classmethod
+    def of_response(cls, response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
+        """Curves of one element of a `FrequencyResponse`, within the range of logarithmic axes."""
+        row, column = _places(force, motion)
+        answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
+        kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
+        kept = kept[np.argsort(response.frequency[kept], kind="stable")]
+        if len(kept) < 2:
+            step = "Give more frequencies, for instance np.geomspace(0.5, 20.0, 500)."
+            raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "at least two", step)
+        static = abs(float(stiffness(response.state).compliance[row, column]))
+        with_mass, massless = (locked(receptance[kept]) for receptance in answers)
+        return cls(locked(response.frequency[kept]), with_mass, massless, static, UNITS[row > 2, column > 2])
 
 
 def _places(force: str, motion: str | None) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.core.arrays import Array, Flags
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.dynamics.vibration.component_modes import CableComponents, component_modes, stretch_energy
+from sagline.dynamics.vibration.component_modes import CableComponents
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_counts, in_world
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics import string as columns
@@ -35,11 +35,54 @@ class VibrationModel(NamedTuple):
     mass: Array  # mass matrix of the platform, shape (N, 6, 6)
     freedom: Array  # matrix that selects the free motions, shape (n, 6)
 
+    @classmethod
+    def of(cls, state: Equilibrium) -> VibrationModel:
+        """Vibration model of one equilibrium or of N equilibria. The arrays have a leading axis in both cases."""
+        slopes = cable_slopes(state)
+        matrix = slopes.matrix.reshape(-1, 6, 6)
+        levers = slopes.levers.reshape(len(matrix), -1, 3)
+        stiffness, mass = 0.5 * (matrix + np.swapaxes(matrix, -1, -2)), mass_matrix(state).reshape(-1, 6, 6)
+        return cls(strings_of(state), motions_of_ends(levers), stiffness, mass, first_of(state.robot).freedom)
+
     def at(self, row: int) -> VibrationModel:
         """The model of the state `row`, with a leading axis of length 1."""
         part = slice(row, row + 1)
         strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
         return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
+
+    def reduced(self, row: int, up_to: float) -> _ReducedModel:
+        """Eigenproblem of the state `row` for its modes below `up_to` [Hz]."""
+        # The unknowns are the modes of the cables up to slightly above this frequency. A few joint motions represent
+        # the response of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes
+        # are relative to the frame. The mass of the platform unknowns is the platform mass plus the remaining
+        # quasi-static mass of the cables. The mass of each mode is 1.
+        components = CableComponents.of(self.strings, row, KEPT * up_to)
+        freedom, ends = self.freedom, self.ends[row]
+        drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
+        kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
+        beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
+        square, count = components.square[kept], int(kept.sum())
+        drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
+        at_rest = freedom @ (self.mass[row] + _on_platform(components.still, ends)) @ freedom.T
+        upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
+        driven = drives @ upper
+        pulled = np.concatenate((square[:, None] * driven[:count], slow @ driven[count:]))
+        n = len(freedom)
+        matrix = np.zeros((n + len(driven), n + len(driven)))
+        stiffness = freedom @ self.stiffness[row] @ freedom.T
+        matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
+        matrix[n:, :n] = -pulled
+        matrix[:n, n:] = -pulled.T
+        np.fill_diagonal(matrix[n : n + count, n : n + count], square)
+        matrix[n + count :, n + count :] = slow
+        return _ReducedModel(matrix, freedom.T @ upper, driven, kept, beyond, components)
+
+    def massless_modes(self, row: int) -> tuple[Array, Array]:
+        """Natural frequencies with massless cables (n,) [Hz], and unstable directions of the platform (6, d)."""
+        freedom = self.freedom
+        upper = np.linalg.inv(np.linalg.cholesky(freedom @ self.mass[row] @ freedom.T)).T
+        squares, vectors = np.linalg.eigh(upper.T @ freedom @ self.stiffness[row] @ freedom.T @ upper)
+        return natural_frequency(squares), freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
 
 
 class _ReducedModel(NamedTuple):
@@ -63,43 +106,6 @@ class _ReducedModel(NamedTuple):
         return found
 
 
-def vibration_model(state: Equilibrium) -> VibrationModel:
-    """Vibration model of one equilibrium or of N equilibria. The arrays have a leading axis in both cases."""
-    slopes = cable_slopes(state)
-    matrix = slopes.matrix.reshape(-1, 6, 6)
-    levers = slopes.levers.reshape(len(matrix), -1, 3)
-    stiffness, mass = 0.5 * (matrix + np.swapaxes(matrix, -1, -2)), mass_matrix(state).reshape(-1, 6, 6)
-    return VibrationModel(strings_of(state), motions_of_ends(levers), stiffness, mass, first_of(state.robot).freedom)
-
-
-def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
-    """Eigenproblem of the state `row` for its modes below `up_to` [Hz]."""
-    # The unknowns are the modes of the cables up to slightly above this frequency. A few joint motions represent the
-    # response of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes are
-    # relative to the frame. The mass of the platform unknowns is the platform mass plus the remaining quasi-static mass
-    # of the cables. The mass of each mode is 1.
-    components = component_modes(model.strings, row, KEPT * up_to)
-    freedom, ends = model.freedom, model.ends[row]
-    drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
-    kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
-    beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
-    square, count = components.square[kept], int(kept.sum())
-    drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
-    at_rest = freedom @ (model.mass[row] + _on_platform(components.still, ends)) @ freedom.T
-    upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
-    driven = drives @ upper
-    pulled = np.concatenate((square[:, None] * driven[:count], slow @ driven[count:]))
-    n = len(freedom)
-    matrix = np.zeros((n + len(driven), n + len(driven)))
-    stiffness = freedom @ model.stiffness[row] @ freedom.T
-    matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
-    matrix[n:, :n] = -pulled
-    matrix[:n, n:] = -pulled.T
-    np.fill_diagonal(matrix[n : n + count, n : n + count], square)
-    matrix[n + count :, n + count :] = slow
-    return _ReducedModel(matrix, freedom.T @ upper, driven, kept, beyond, components)
-
-
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
     """A few joint motions that represent many modes: orthonormal columns of amplitudes, and stiffness matrix."""
     chain = [drives / square[:, None]]
@@ -110,15 +116,7 @@ def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
     return basis, basis.T @ (square[:, None] * basis)
 
 
-def massless_modes(model: VibrationModel, row: int) -> tuple[Array, Array]:
-    """Natural frequencies with massless cables (n,) [Hz], and unstable directions of the platform (6, d)."""
-    freedom = model.freedom
-    upper = np.linalg.inv(np.linalg.cholesky(freedom @ model.mass[row] @ freedom.T)).T
-    squares, vectors = np.linalg.eigh(upper.T @ freedom @ model.stiffness[row] @ freedom.T @ upper)
-    return natural_frequency(squares), freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
-
-
-def dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float) -> Array:
+def _dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float) -> Array:
     """Dynamic stiffness D for the free motions, exact."""
     # shapes: moving (m, 3, 3) [N/m]; omega [rad/s]; returns (n, n)
     matrix = model.stiffness[row] + _on_platform(moving, model.ends[row]) - omega**2 * model.mass[row]
@@ -144,7 +142,7 @@ def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
     check_counts(counts, given)
     moving = np.zeros((model.strings.taut.shape[1], 3, 3))
     moving[taut] = in_world(found[0], model.strings.axes[row, taut])[0].real
-    matrix = dynamic_matrix(model, row, moving, 2.0 * np.pi * frequency)
+    matrix = _dynamic_matrix(model, row, moving, 2.0 * np.pi * frequency)
     return int(counts.sum()) + int((np.linalg.eigvalsh(matrix) < 0.0).sum())
 
 
@@ -178,13 +176,33 @@ class StateModes:
         """Amplitudes of the fixed-end modes in addition to quasi-static motion, shape (T, K)."""
         return self.problem.amplitudes(self.vectors)
 
+    def cable_shares(self) -> Array:
+        """Cable shares of the kinetic energy of each mode, (m, K)."""
+        parts, ends, own = self.components, self.ends, self.amplitudes
+        shares = np.asarray((ends * (parts.still @ ends)).sum(axis=1))
+        for motions, end, given in parts.planes(ends, own):
+            shares[parts.taut] += (given * (given + 2.0 * (motions.drive @ end))).sum(axis=1)
+        return shares
+
+    def damping_ratios(self, density: Array, shares: Array, damping: Damping) -> Array:
+        """Damping ratio of each mode, to first order: lost power divided by the lost power of critical damping."""
+        # shapes: density (m,) [kg/m]; returns (K,)
+        omega = 2.0 * np.pi * self.frequency
+        lost = np.zeros(omega.size)
+        if damping.air_damping > 0.0:
+            lost += damping.air_damping * (shares / density[:, None]).sum(axis=0)
+        if damping.loss_time > 0.0:
+            lost += damping.loss_time * self.components.stretch_energy(self.ends, self.amplitudes).sum(axis=0)
+        ratio = np.where(lost > 0.0, lost / (2.0 * np.where(omega > 0.0, omega, np.nan)), 0.0)
+        return np.asarray(damping.modal_damping + ratio)
+
 
 def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
     """Compute the modes of the state `row` below `up_to` [Hz]. The exact count checks the number of modes."""
-    check_string_count(model.strings, row, up_to, "up_to")
+    _check_string_count(model.strings, row, up_to, "up_to")
     count = modes_below(model, row, up_to)
     check_mode_count(count, up_to, "up_to")
-    problem = reduced_model(model, row, up_to)
+    problem = model.reduced(row, up_to)
     square, vectors = np.linalg.eigh(problem.matrix)
     frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
     border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
@@ -193,13 +211,13 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
         raise SaglineError(f"{text}. Use another up_to, and report the robot and its pose.")
     # cable mass has no static effect, so that the number of modes at exactly 0 Hz does not change
     if count and frequency[0] < SLOW * up_to:
-        frequency[: np.count_nonzero(massless_modes(model, row)[0] == 0.0)] = 0.0
+        frequency[: np.count_nonzero(model.massless_modes(row)[0] == 0.0)] = 0.0
     vectors = vectors[:, :count]
     platform = problem.platform @ vectors[: problem.platform.shape[1]]
     return StateModes(frequency[:count], platform, model.ends[row] @ platform, count, problem, vectors)
 
 
-def check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
+def _check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
     """Reject `frequency` [Hz] before the exact count if the cables have far too many modes below it.
 
     In each of two directions, N half waves of a cable have the phase pi N. This phase is the integral of omega
@@ -225,25 +243,3 @@ def check_mode_count(count: int, frequency: float, item: str) -> None:
     if count > MOST_MODES:
         value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
         raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
-
-
-def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
-    """Cable shares of the kinetic energy of each mode, (m, K)."""
-    parts, ends, own = found.components, found.ends, found.amplitudes
-    shares = np.asarray((ends * (parts.still @ ends)).sum(axis=1))
-    for motions, end, given in parts.planes(ends, own):
-        shares[parts.mesh.taut] += (given * (given + 2.0 * (motions.drive @ end))).sum(axis=1)
-    return shares
-
-
-def damping_ratios(density: Array, found: StateModes, shares: Array, damping: Damping) -> Array:
-    """Damping ratio of each mode, to first order: lost power divided by the lost power of critical damping."""
-    # shapes: density (m,) [kg/m]; returns (K,)
-    omega = 2.0 * np.pi * found.frequency
-    lost = np.zeros(omega.size)
-    if damping.air_damping > 0.0:
-        lost += damping.air_damping * (shares / density[:, None]).sum(axis=0)
-    if damping.loss_time > 0.0:
-        lost += damping.loss_time * stretch_energy(found.components, found.ends, found.amplitudes).sum(axis=0)
-    ratio = np.where(lost > 0.0, lost / (2.0 * np.where(omega > 0.0, omega, np.nan)), 0.0)
-    return np.asarray(damping.modal_damping + ratio)

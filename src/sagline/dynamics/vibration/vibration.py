@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
@@ -11,11 +10,10 @@ import numpy as np
 from sagline.core.arguments import brief, instance, optional
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import Result
+from sagline.core.results import Result, Status
 from sagline.core.table import Columns, Tabular
 from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
 from sagline.dynamics.vibration import robot_modes
-from sagline.dynamics.vibration.component_modes import cable_shapes
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model, single_state
 from sagline.dynamics.vibration.flexibility import stretch_losses
 from sagline.motion.path import Path
@@ -25,27 +23,17 @@ from sagline.statics.balance import inertial_wrench
 from sagline.statics.stiffness import Modes, modes
 
 
-class VibrationStatus(IntEnum):
+class VibrationStatus(Status):
     """Status of a vibration: type of the equilibrium and of its cables."""
 
-    SOLVED = 0
-    UNSTABLE = 1
-    NO_LENGTHS = 2
-    FOLDED = 3
-
-    @property
-    def text(self) -> str:
-        """Meaning, and the next step."""
-        return _TEXTS[self]
-
-
-_TEXTS = {
-    VibrationStatus.SOLVED: "all modes up to the requested frequency are found",
-    VibrationStatus.UNSTABLE: "the equilibrium is unstable along its negative_directions; simulate the motion",
-    VibrationStatus.NO_LENGTHS: "the pose has no solution: see the status of the plan",
-    VibrationStatus.FOLDED: "a cable is folded or slack and has no linear vibration: its index is in slack_cables; "
-    "the modes belong to the platform and the other cables",
-}
+    SOLVED = 0, "all modes up to the requested frequency are found"
+    UNSTABLE = 1, "the equilibrium is unstable along its negative_directions; simulate the motion"
+    NO_LENGTHS = 2, "the pose has no solution: see the status of the plan"
+    FOLDED = (
+        3,
+        "a cable is folded or slack and has no linear vibration: its index is in slack_cables; the modes belong to the "
+        "platform and the other cables",
+    )
 
 
 _NEAR: Final = 3.0  # a second frequency is reported if its excitation times this factor exceeds the largest
@@ -190,7 +178,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
     check_model(single_state(state))
     limit = number(up_to, "up_to", "Hz", above=0.0)
     given = optional(damping, Damping, "damping") or Damping()
-    model = robot_modes.vibration_model(state)
+    model = robot_modes.VibrationModel.of(state)
     slack: tuple[int, ...] = tuple(int(i) for i in np.flatnonzero(~model.strings.taut[0]))
     cables, none = state.cables.shape[-1], np.empty(0)
     arrays = {  # without modes
@@ -204,18 +192,18 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
         slack = ()
     else:
         status = VibrationStatus.UNSTABLE
-        arrays["massless_frequency"], arrays["negative_directions"] = robot_modes.massless_modes(model, 0)
+        arrays["massless_frequency"], arrays["negative_directions"] = model.massless_modes(0)
         if not arrays["negative_directions"].shape[1]:
             status = VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED
             found = robot_modes.state_modes(model, 0, limit)
-            shares, count = robot_modes.cable_shares(model, 0, found), found.number
+            shares, count = found.cable_shares(), found.number
             arrays |= {
                 "frequency": found.frequency,
                 "shape": found.platform,
                 "platform_share": np.asarray(1.0 - shares.sum(axis=0)),
                 "cable_share": shares,
-                "cable_shape": cable_shapes(found.components, found.ends, found.amplitudes, POINTS),
-                "loss": robot_modes.damping_ratios(state.one_robot.cables.linear_density, found, shares, given),
+                "cable_shape": found.components.shapes(found.ends, found.amplitudes, POINTS),
+                "loss": found.damping_ratios(state.one_robot.cables.linear_density, shares, given),
             }
     kept = {name: locked(array) for name, array in arrays.items()}
     return Vibration(state=state, up_to=limit, damping=given, status=status, count=count, slack_cables=slack, **kept)

@@ -15,12 +15,12 @@ from sagline.kernels.jit import formula, kernel
 START, LOW, HIGH = 0, 1, 2
 STRIP_ROWS = 3
 
-TOLERANCE = 1e-12  # relative to the largest bound; a smaller violation does not count
+TOLERANCE = 1e-12  # relative to the largest bound; a smaller violation of a bound is ignored
 
 
 @formula
 def largest_bound(bounds: Array) -> float:
-    """Largest finite number in `bounds`. Tolerances are relative to this number."""
+    """Largest finite number in `bounds`, to which tolerances are relative."""
     start = low = high = 0.0  # three independent maxima, which the processor computes in parallel
     for i in range(bounds.shape[1]):
         start = max(start, abs(bounds[START, i]))
@@ -40,20 +40,20 @@ def box_radius(largest: float, bounds: Array) -> float:
 
 @formula
 def inward(label: int) -> float:
-    """Sign that turns the column of a bound into the inward normal of the side `label`."""
+    """Factor (1 or -1) that converts the column of a bound to the inward normal of the side `label`."""
     return 1.0 if label % 2 == 0 else -1.0
 
 
 @formula
 def side_of(bounds: Array, label: int) -> float:
-    """Lower limit of normal . x on the side `label`."""
+    """Lower limit that the side `label` sets to the product normal . x."""
     i = label // 2
     return bounds[LOW, i] - bounds[START, i] if label % 2 == 0 else bounds[START, i] - bounds[HIGH, i]
 
 
 @formula
 def most_violated_bound(rows: Array, bounds: Array, point: Array, slack: float, first: bool) -> int:
-    """Label of the most violated side; with `first`, of the first violated side. -1 if no violation exceeds `slack`."""
+    """Label of the most violated side, or of the first violated side if `first`. -1 if no violation exceeds `slack`."""
     d, k = rows.shape
     worst = slack
     label = -1

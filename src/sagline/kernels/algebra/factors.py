@@ -1,8 +1,8 @@
 """Small dense matrices: Cholesky and Householder factors, Gauss elimination, orthonormal frames, extreme eigenvalues.
 
 A matrix (n, m), n <= m, is factored as matrix.T = Q R with an orthogonal Q. The first n columns of Q give the
-minimum-norm solutions. The other columns span the null space. In the short loops a single sum would have to wait for
-each term. The loops therefore add several independent sums.
+minimum-norm solutions. The other columns of Q span the null space. In a single sum, each addition waits for the
+previous addition. The short loops therefore compute several independent sums.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def copy(source: Array, target: Array) -> None:
 
 @kernel
 def factor_positive(matrix: Array, shift: float, factor: Array) -> bool:
-    """Fill the lower triangle of the factor L of `matrix` + `shift` 1, (n, n). False if not positive definite.
+    """Fill the Cholesky factor L, lower triangle, of `matrix` (n, n) + `shift` * 1. False if not positive definite.
 
     Only the lower triangle of `matrix` is used. `factor` may be the same array as `matrix`.
     """
@@ -113,8 +113,8 @@ def solve_general(matrix: Array, right: Array) -> bool:
 def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
     """Make row `count` of a frame (.., d) orthogonal to the rows before it, which are orthonormal.
 
-    The subtracted components fill column `count` of the triangle above its diagonal. Returns the squared length of the
-    new row.
+    Column `count` of the triangle is filled, above the diagonal, with the subtracted components. Returns the squared
+    length of the new row.
     """
     d = frame.shape[1]
     for b in range(count):
@@ -144,7 +144,7 @@ def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> N
 
 HEADS, FACTORS = 0, 1
 
-RANK = 1e-9  # relative to its row of the matrix; a matrix with a smaller diagonal entry of R does not have full rank
+RANK = 1e-9  # least diagonal entry of R, relative to the row of the matrix, that counts as full rank
 
 
 @formula
@@ -183,7 +183,7 @@ def factorize(reduced: Array, diagonals: Array) -> bool:
 
 @formula
 def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
-    """Fill Q (m, m) from its reflections. Row m of `q` is a work row."""
+    """Fill `q` with the orthogonal matrix Q (m, m) from the reflections. Row m of `q` is used as work memory."""
     n, m = reduced.shape
     q[:] = 0.0
     for i in range(m):
@@ -201,7 +201,7 @@ def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
 
 @formula
 def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -> None:
-    """Fill the transposed pseudo-inverse (n, m). The minimum-norm solution is right . inverse."""
+    """Fill `inverse` (n, m), the transposed pseudo-inverse. The minimum-norm solution for a vector b is b . inverse."""
     n, m = reduced.shape
     for k in range(n - 1, -1, -1):
         for i in range(m):
@@ -225,14 +225,14 @@ def minimum_norm(inverse: Array, right: Array, solution: Array) -> None:
 
 
 STEPS = 100
-STILL = 1e-16  # relative to the largest eigenvalue; a shorter step is smaller than the rounding error
+STILL = 1e-16  # step length relative to the largest eigenvalue; shorter steps are only rounding errors
 
 
 @formula
 def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
     """Reduce `matrix` to tridiagonal form (Householder). Fills `diagonal` and `beside`, (n,); overwrites `matrix`."""
     n = matrix.shape[0]
-    product = diagonal  # used as work memory; the diagonal is filled at the end
+    product = diagonal  # `diagonal` is work memory here, and is filled at the end
     for k in range(n - 2):
         square = 0.0
         for i in range(k + 1, n):
@@ -267,7 +267,7 @@ def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array
 
 @formula
 def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
-    """Lower bound of the eigenvalues of `sign` T, by Gershgorin's circles. T is tridiagonal."""
+    """Lower bound of the eigenvalues of the tridiagonal matrix `sign` * T, from Gershgorin's circles."""
     low = math.inf
     before = 0.0
     for k in range(diagonal.shape[0]):
@@ -279,10 +279,10 @@ def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
-    """Smallest eigenvalue of `sign` T, by Laguerre's iteration from below. T is tridiagonal.
+    """Smallest eigenvalue of the tridiagonal matrix `sign` * T, by Laguerre's iteration from below.
 
-    The product of the pivots q of the shifted matrix is its characteristic polynomial. All pivots are positive below
-    the smallest root. The iteration never passes this root.
+    The product of the pivots q of the shifted matrix is the characteristic polynomial. All pivots are positive below
+    the smallest root, which the iteration never passes.
     """
     n = diagonal.shape[0]
     root = _gershgorin_bound(diagonal, beside, sign)
@@ -311,8 +311,8 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
     """Smallest and largest eigenvalue of a symmetric matrix (n, n). All arrays are overwritten.
 
-    The largest eigenvalue has an upper bound, which is at most three times as large. If |smallest| exceeds `flat` times
-    this bound, the bound is returned instead of the largest eigenvalue. This takes less time.
+    If |smallest| exceeds `flat` times an upper bound of the largest eigenvalue, this bound is returned instead of the
+    largest eigenvalue, which saves time. The bound is at most three times the largest eigenvalue.
     """
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)

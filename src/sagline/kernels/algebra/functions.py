@@ -1,8 +1,8 @@
 """Hyperbolic functions without cancellation.
 
-For h^2 <= 4 they are Taylor polynomials in h^2, which the compiler can vectorize. Terms below 1e-18 are omitted. Each
-polynomial is the sum of four independent chains, because in a single chain each product would wait for the previous
-product.
+For h^2 <= 4, the functions are Taylor polynomials in h^2, which the compiler can vectorize. Terms below 1e-18 are
+omitted. Each polynomial is the sum of four independent chains, because in a single chain each product would wait for
+the previous product.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def sinh_excess(h: float) -> float:
 def atanhc(u: float) -> float:
     """The ratio atanh(u)/u for 0 <= u <= 0.5."""
     y = u * u
-    if y < 0.01:  # ten terms; the rest is below 1e-20
+    if y < 0.01:  # ten terms of the series; the omitted terms are below 1e-20
         s = 1 / 21
         s = s * y + 1 / 19
         s = s * y + 1 / 17
@@ -99,7 +99,7 @@ def atanhc(u: float) -> float:
 
 @formula
 def atanhc_excess_polynomial(y: float) -> float:
-    """The difference atanh(u)/u - 1 for y = u^2 <= 0.0625: sixteen terms, the rest is below 1e-19."""
+    """The difference atanh(u)/u - 1 for y = u^2 <= 0.0625: sixteen terms; omitted terms are below 1e-19."""
     q = y * y
     r = q * q
     a = 1 / 3 + r * (1 / 11 + r * (1 / 19 + r * (1 / 27)))
@@ -136,7 +136,7 @@ def _arctangent_ratio(y: float) -> float:
 
 @formula
 def angle(sine: float, cosine: float) -> float:
-    """Angle from 0 to pi [rad] with the given sine >= 0 and cosine. A common positive factor of both has no effect."""
+    """Angle from 0 to pi [rad] from `sine` >= 0 and `cosine`. Sine and cosine may have a common positive factor."""
     level = abs(cosine)
     steep = sine > MORE * level
     middle = sine > LESS * level

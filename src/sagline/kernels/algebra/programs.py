@@ -1,13 +1,13 @@
 """Optimal points within all bounds: the point of least linear cost, and the point nearest to a target.
 
-The linear program has few unknowns and is solved by the dual simplex method. It visits points that are optimal for
-their active sides. It ends at a point that satisfies all bounds. It also ends if a side contradicts the active sides,
-which proves infeasibility. If only the limits change, the sides of the last solution are still optimal, and the next
-search starts from them.
+The linear program has few unknowns and is solved by the dual simplex method. The method moves from point to point; each
+point is optimal for the sides that are active there. The method ends at a point that satisfies all bounds, or at a side
+that contradicts the active sides, which proves infeasibility. If only the limits of the bounds change, the active sides
+of the last solution remain optimal, and the next search starts from them.
 
-The nearest point, for any number of unknowns, is found by a dual active-set method; docs/model.md, section 5. It starts
-from the target. It adds violated sides one by one, and drops sides with a negative multiplier, until all sides are
-satisfied. The search starts with the active sides of a similar problem, which are usually also active in the solution.
+The nearest point, for any number of unknowns, is found by a dual active-set method; docs/model.md, section 5. The
+method starts from the target. The search adds violated sides one by one, and drops sides with a negative multiplier,
+until all sides are satisfied. The active sides of a similar problem are tried first: they are usually active.
 
 Source:
     Goldfarb & Idnani 1983, "A numerically stable dual method for solving strictly convex quadratic programs", with
@@ -28,12 +28,12 @@ from sagline.kernels.memory import Memory, block, counters, vector
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
 CAREFUL = 60  # number of pivots after which ties are decided by label (Bland's rule), so that the search cannot cycle
-ROUNDING = 4e-16  # relative to the largest coordinate of a point
+ROUNDING = 4e-16  # rounding error of a point, relative to its largest coordinate
 PIVOT = 1e-11  # smallest pivot, relative to the largest entry of the row
 
 
 class Basis(NamedTuple):
-    """The active sides of an optimal point, from which the next program with the same rows and cost can start.
+    """The active sides of an optimal point, from which the next program with equal rows and cost can start.
 
     A finite limit must stay finite in the next program, because a side at infinity cannot be active.
     """
@@ -43,7 +43,7 @@ class Basis(NamedTuple):
     # infinity.
     labels: Indices
     weights: Array  # multipliers of the infeasibility proof, (d + 1,), >= 0
-    inverse: Array  # inverse of the matrix of the sides' normals, (d, d)
+    inverse: Array  # inverse of the matrix of the normals of the active sides, (d, d)
 
 
 @glue
@@ -57,7 +57,7 @@ def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
 
 @formula
 def _growth_along_edge(rows: Array, label: int, inverse: Array, j: int) -> float:
-    """Growth of normal . x along edge `j` of the present basis, for the normal of the side `label`."""
+    """Growth of the product normal . x along edge `j` of the basis; the normal is that of the side `label`."""
     total = 0.0
     for i in range(inverse.shape[0]):
         total += rows[i, label // 2] * inverse[i, j]
@@ -66,7 +66,7 @@ def _growth_along_edge(rows: Array, label: int, inverse: Array, j: int) -> float
 
 @formula
 def _violation(rows: Array, bounds: Array, label: int, radius: float, cost: Array, point: Array) -> float:
-    """Violation of the side `label` by `point`. Labels from 2k on are sides of the box."""
+    """Violation of the side `label` by `point`. Labels of 2k and more are sides of the box that replaces infinity."""
     box = label - 2 * rows.shape[1]
     if box >= 0:
         return -radius - (point[box] if cost[box] >= 0.0 else -point[box])
@@ -92,7 +92,7 @@ def _start_at_box_corner(rows: Array, cost: Array, radius: float, basis: Basis, 
 
 @glue
 def _exchange_sides(rows: Array, entering: int, leaving: int, miss: float, basis: Basis, point: Array) -> None:
-    """Replace the side `leaving` of the basis by `entering`, which the point violates, and move to the new point."""
+    """Replace the side `leaving` of the basis by the violated side `entering`, and move `point` to the new vertex."""
     labels, weights, inverse = basis
     d = point.size
     pivot = _growth_along_edge(rows, entering, inverse, leaving)
@@ -126,7 +126,7 @@ def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basi
 def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
     """Fill `point` (d,) with the point of least cost . x within all bounds. Returns the outcome.
 
-    Bounds may be violated by `slack`; 0 means the usual tolerance. A program with a solution on the box is unbounded.
+    `slack`: allowed violation of a bound; 0 for the usual tolerance. At the box that replaces infinity: unbounded.
     """
     labels, weights, inverse = basis
     d = cost.size
@@ -179,7 +179,7 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
 
 
 EXCHANGES = 2000
-DEPENDENT = 1e-10  # a side counts as dependent on the others if the part of its normal outside their span is smaller
+DEPENDENT = 1e-10  # least part of a side's normal outside the span of the other normals
 
 # rows of `pushes`
 PUSH, SHARE = 0, 1  # multipliers of the active sides, and components of the entering side
@@ -206,7 +206,7 @@ def new_active_set(memory: Memory, d: int) -> tuple[ActiveSet, Memory]:
 
 @glue
 def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: Array, point: Array) -> bool:
-    """Fill the point on all active sides that is nearest to `target`. False if this point is not optimal."""
+    """Fill `point`, the point on all active sides that is nearest to `target`. False if `point` is not optimal."""
     labels, frame, triangle, pushes = held
     count, d = labels[0], point.size
     copy(target, point)
@@ -254,9 +254,9 @@ def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
 
 @kernel
 def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
-    """Fill the point (d,) within all bounds (up to `slack`) that is nearest to `target` (d,). False if none exists.
+    """Fill `point` (d,), the nearest to `target` (d,) within all bounds, up to `slack`. False if no such point exists.
 
-    held: active sides of a similar problem, or labels[0] = 0; overwritten with the active sides of the point.
+    `held`: active sides of a similar problem, or labels[0] = 0; overwritten with the active sides of the point.
     """
     labels, frame, triangle, pushes = held
     d = target.size

@@ -17,10 +17,7 @@ from sagline.kernels.cable.states import solve_cable_state
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, chord_at, material_at, model_of
 from sagline.kernels.jit import entry, glue, kernel
 
-CHUNK = 256  # cables per chunk; buffers of this length fit into the fastest cache of the processor
-BUFFERS = 11
-
-# span, rise, linear density, axial stiffness, and the given tension or length: as Python passes them
+# operands in Python's order: span, rise, linear density, axial stiffness, and the given tension or length
 Operands = tuple[Array, Array, Array, Array, Array]
 # span, rise, linear density, axial stiffness, unstrained length, T_x, T_z and chord tension
 States = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
@@ -41,11 +38,11 @@ def _copy_chunk(source: Array, start: int, stop: int, target: Array) -> None:
 def batch_from_tension(terms: Terms, cables: Operands, found: tuple[Array, Array, Array, Codes], buffer: Array) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
-    Loops without branches solve all cables of a chunk as ordinary catenaries. The other cables are then solved again,
-    one by one. Each loop computes one result, because the compiler does not vectorize loops with several results.
+    Loops without branches solve all cables of a chunk as ordinary catenaries. The cables that are not ordinary are then
+    solved again, one by one. Each loop has one result, because the compiler vectorizes only such loops.
 
-    cables: span, rise, density, axial stiffness and chord tension; found: filled with length, T_x, T_z and status;
-    buffer: work array, (BUFFERS, CHUNK).
+    `cables`: span, rise, density, axial stiffness and chord tension. `found`: filled with length, T_x, T_z and status.
+    `buffer`: work array, (BUFFERS, CHUNK).
     """
     model = model_of(terms)
     span, rise, density, stiffness, tension = cables
@@ -54,8 +51,8 @@ def batch_from_tension(terms: Terms, cables: Operands, found: tuple[Array, Array
     x, z, rho, ea, tau = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
     chord, sine, cosine, half = buffer[5], buffer[6], buffer[7], buffer[8]
     ratio, sag_force = buffer[9], buffer[10]
-    for start in range(0, count, CHUNK):
-        stop = min(start + CHUNK, count)
+    for start in range(0, count, tables.CHUNK):
+        stop = min(start + tables.CHUNK, count)
         size = stop - start
         _copy_chunk(span, start, stop, x)
         _copy_chunk(rise, start, stop, z)
@@ -99,7 +96,7 @@ def batch_from_tension(terms: Terms, cables: Operands, found: tuple[Array, Array
 
 @entry
 def batch_from_length(terms: Terms, cables: Operands, found: tuple[Array, Array, Array, Codes]) -> None:
-    """Chord tension, T_x, T_z and status of every cable at its unstrained length, the last operand."""
+    """Fill `found`: chord tension, T_x, T_z and status of every cable at its unstrained length (last of `cables`)."""
     model = model_of(terms)
     span, rise, density, stiffness, length = cables
     tension_out, horizontal_out, vertical_out, status_out = found
@@ -167,7 +164,7 @@ def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: fl
 def _catenary_sag(
     span: float, rise: float, length: float, horizontal: float, vertical: float, weight: float, stiffness: float
 ) -> float:
-    """Largest vertical distance of a cable below its chord [m]. Below its lower end if the chord is vertical."""
+    """Largest vertical distance [m] of a cable below its chord, or below its lower end if the chord is vertical."""
     slope = rise / span if span > 0.0 else 0.0
     # length from the frame end to the point whose tangent is parallel to the chord, or to the turning point if the
     # chord is vertical
@@ -194,7 +191,7 @@ def largest_sags(terms: Terms, cables: States, sag_out: Array) -> None:
 
 @entry
 def closures(terms: Terms, cables: States, residual_out: Array) -> None:
-    """Error of each cable in the equations of its model [m]: of a catenary's platform end, or of the length."""
+    """Error [m] of each cable in its model's equations: error of a catenary's platform end, else of the length."""
     model = model_of(terms)
     span, rise, density, stiffness, length, horizontal, vertical, tension = cables
     for i in range(residual_out.shape[0]):
@@ -220,13 +217,13 @@ def closures(terms: Terms, cables: States, residual_out: Array) -> None:
 def creep_strains(
     time: Array, tension: Array, stiffness: Array, delay: Array, settled: Flags, strain_out: Array
 ) -> None:
-    """Sum of the delayed strains of elements (spring parallel to damper). It is exact for piecewise linear tensions.
+    """Creep strain: sum of the strains of elements (spring parallel to damper). Exact for piecewise linear tensions.
 
-    Samples whose tension is NaN are omitted. The tension is then linear in time between their neighbors.
+    Samples whose tension is NaN are omitted. Between the neighbors of an omitted sample, the tension is linear in time.
 
-    time: increasing [s], (N,); tension: (N, m) [N]; stiffness, delay: stiffness [N] and delay time [s] of each element;
-    settled: True if the first tension has acted for a long time, (1,); if False, the initial strain is zero;
-    strain_out: filled, (N, m).
+    `time`: increasing [s], (N,). `tension`: (N, m) [N]. `stiffness`, `delay`: stiffness [N] and delay time [s] of each
+    element. `settled`: True if the first tension has acted for a long time, (1,); if False, the initial strain is zero.
+    `strain_out`: filled, (N, m).
     """
     for i in range(tension.shape[1]):
         for p in range(tension.shape[0]):
@@ -254,11 +251,12 @@ def cable_courses(
 ) -> None:
     """Points of exact cables from their frame anchors over their pulleys to their platform ends.
 
-    A cable without a tension is drawn along its chord. A cable without a chord is drawn as a line between its ends.
+    A cable without a tension is drawn along its chord. If the platform end is too near
+    to the pulley for a chord, a straight line between the anchors is drawn.
 
-    tension: chord tensions [N], (m,); NaN for a cable without a tension. wraps: number of points on each pulley, 0 or
-    at least 2. Without a pulley, all are at the frame anchor. rotation, geometry: work arrays, (3, 3) and
-    (GEOMETRY_ROWS, m). points: filled with the points in world axes [m], (m, points, 3).
+    `tension`: chord tensions [N], (m,); NaN for a cable without a tension. `wraps`: number of points on each pulley, 0
+    or at least 2. Without a pulley, all are at the frame anchor. `rotation`, `geometry`: work arrays, (3, 3) and
+    (GEOMETRY_ROWS, m). `points`: filled with the points in world axes [m], (m, points, 3).
     """
     gravity = body[tables.GRAVITY]
     model = Model(codes.CATENARY, 0.0, 0.0, gravity, None)
@@ -295,7 +293,7 @@ def cable_courses(
 
 @glue
 def _write_point(cables: Array, geometry: Array, i: int, x: float, z: float, points: Array, k: int) -> None:
-    """Write point `k` of cable `i` in world axes [m]; `x`, `z`: position in its plane, relative to the frame anchor."""
+    """Write point `k` of cable `i` in world axes [m]. `x`, `z`: position in its plane, relative to the frame anchor."""
     points[i, k, 0] = cables[i, tables.FRAME_X] + geometry[AZIMUTH_X, i] * x
     points[i, k, 1] = cables[i, tables.FRAME_Y] + geometry[AZIMUTH_Y, i] * x
     points[i, k, 2] = cables[i, tables.FRAME_Z] + z

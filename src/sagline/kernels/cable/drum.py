@@ -15,8 +15,7 @@ from sagline.kernels.jit import entry, formula
 # columns of the table of drums
 PITCH_RADIUS, LAYER_RISE, GROOVE_PITCH, LAYER_TURNS, LAYERS, DISTANCE, OFFSET = range(7)
 DRUM_COLUMNS = 7
-# Rows of a drum's memory. Each column is a piece of cable between its deeper end, which was wound first, and its upper
-# end.
+# Rows of a drum's memory. Each column is a piece of cable on the drum. Its deeper end was wound before its upper end.
 DEEP_LENGTH, DEEP_PATH, DEEP_STRAIN, TOP_STRAIN = range(4)
 MEMORY_ROWS = 4
 STEPS = 60  # largest number of Newton steps; for a convex function of one variable, two or three are sufficient
@@ -26,7 +25,7 @@ SETTLED = 1e-8
 
 @formula
 def _slant_length(distance: float, offset: float) -> float:
-    """Extra length [m] of the slanted cable between drum and pulley. It is zero if `distance` is infinite."""
+    """Extra length [m] of the slanted cable between drum and pulley. The result is zero if `distance` is infinite."""
     return offset * offset / (math.sqrt(distance * distance + offset * offset) + distance)
 
 
@@ -47,7 +46,7 @@ def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]
 
 @formula
 def _wound_length(drum: Array, layer: int, turns: float) -> float:
-    """Cable length [m] that the first `turns` of `layer` take up: a convex and increasing function of the turns."""
+    """Cable length [m] in the first `turns` turns of `layer`: a convex and increasing function of `turns`."""
     first, _ = _exit_position(drum, layer, 0.0)
     place, _ = _exit_position(drum, layer, turns)
     distance = drum[DISTANCE]
@@ -56,12 +55,12 @@ def _wound_length(drum: Array, layer: int, turns: float) -> float:
 
 @entry
 def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Array, travel_out: Array) -> None:
-    """Turns on each drum, and change of length per turn [m], at the lengths `length` off the drum.
+    """Fill the number of turns on each drum, and the change of length per turn [m], for each `length` off the drum.
 
-    Turns are negative beyond the empty drum, and exceed the drum's capacity beyond its last layer.
+    The number of turns is negative if `length` exceeds the whole cable, and exceeds the capacity beyond the last layer.
 
-    drums: table, (m, DRUM_COLUMNS); starts: length off the drum at which each layer begins, in decreasing order, (m,
-    layers + 1); length: lengths at the winding tension [m], (N, m); turns_out, travel_out: filled, (N, m).
+    `drums`: table, (m, DRUM_COLUMNS). `starts`: length off the drum at which each layer begins, in decreasing order,
+    (m, layers + 1). `length`: lengths at the winding tension [m], (N, m). `turns_out`, `travel_out`: filled, (N, m).
     """
     for p in range(length.shape[0]):
         for i in range(length.shape[1]):
@@ -108,11 +107,11 @@ def follow_memory(
     """Conversion between unstrained lengths off the drum and lengths along the path of winding.
 
     On the drum the cable keeps the strain with which it was wound. The strain at the drum is linear in length between
-    two samples. Cable that was never off the drum has the initial strain. Samples with NaN are omitted.
+    two samples. Cable that never left the drum has the initial strain. Samples with NaN are omitted.
 
-    given: lengths off the drum [m], (N, m): unstrained if `unstrained` is true, else along the path of winding; strain:
-    strain of the cable at the drum for each sample, (N, m); rest_strain: initial strain of the cable on the drum, (m,);
-    found_out: filled with the converted lengths [m], (N, m); memory: work array, (MEMORY_ROWS, N).
+    `given`: lengths off the drum [m], (N, m): unstrained if `unstrained` is true, else along the path of winding.
+    `strain`: strain of the cable at the drum for each sample, (N, m). `rest_strain`: initial strain of the cable on the
+    drum, (m,). `found_out`: filled with the converted lengths [m], (N, m). `memory`: work array, (MEMORY_ROWS, N).
     """
     for i in range(given.shape[1]):
         depth, begun = 0, False

@@ -4,10 +4,10 @@ Most calls are for a pose close to the previous pose. Two Halley steps from the 
 ordinary catenaries. The cables that have not converged are then solved one by one, without the previous h.
 
 A cable over a pulley is replaced by an equivalent cable without a pulley, which starts where the chord touches the
-pulley. The equivalent cable is shorter by the length between this point and the drum. It is softer, because it also
-includes the stretch of this length. In the next pass, span and rise are corrected by the error of the platform end. The
-next pose starts with these corrections, so that a nearby pose needs only one or two passes. Each loop has one result
-and no branches, so that it vectorizes.
+pulley. The cable between the drum and the start of the chord is not part of the equivalent cable. The stretch of that
+part is included, which makes the equivalent cable softer. In the next pass, span and rise are corrected by the error of
+the platform end. The next pose starts with the corrections of the last pose, so that a nearby pose needs only one or
+two passes. Each loop has one result and no branches, so that the compiler vectorizes it.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from sagline.kernels.cable.pulley import (
     softness,
     straight_behind,
 )
+from sagline.kernels.cable.swivel import energy_of_swivel, solve_swivel
 from sagline.kernels.cable.terms import Material, Model, PlaneStiffness, chord_at, material_at
 from sagline.kernels.jit import formula, glue
 
@@ -45,18 +46,18 @@ LEAST_FREE = 1e-3  # shortest equivalent cable, relative to the cable's length
 TINY = 1e-300  # [N]; avoids a division by zero force
 ORDINARY_END = math.sqrt(
     functions.EXCESS_LIMIT
-)  # largest u = wL/(T_A + T_B) for which the series of P1 is a polynomial
+)  # largest u = wL/(T_A + T_B) for which P1 uses a polynomial instead of the series
 
 
 @formula
 def _wrap_at(rows: Array, i: int) -> Wrap:
-    """Wrap of cable `i` on its pulley, after `update_from_equivalent_cables`."""
+    """Wrap of cable `i` on its pulley, after `_update_from_equivalent_cables`."""
     return Wrap(rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i], rows[g.WRAP, i])
 
 
 @glue
-def start_passes(cables: Array, rows: Array) -> None:
-    """Fill the cable lengths between chords and drums. Reset the corrections of cables without a previous parameter."""
+def _start_passes(cables: Array, rows: Array) -> None:
+    """Fill the lengths between chords and drums. Cables without a previous solution begin with zero corrections."""
     for i in range(rows.shape[1]):
         rows[g.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
     for i in range(rows.shape[1]):
@@ -65,7 +66,7 @@ def start_passes(cables: Array, rows: Array) -> None:
 
 
 @glue
-def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
+def _fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
     """Fill the equivalent cables, which replace the cables over pulleys."""
     m = rows.shape[1]
     for i in range(m):
@@ -88,10 +89,10 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
 
 
 @glue
-def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
+def _update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
     """Fill forces and free spans from the equivalent cables. Returns the largest error, relative to the cable length.
 
-    It is the error of the platform end of an exact cable, and of the length of a shallow cable.
+    The error of an exact cable is that of its platform end; the error of a shallow cable is that of its length.
     """
     if model.code == codes.CATENARY:
         _exit_points_from_forces(model, cables, rows)
@@ -102,7 +103,7 @@ def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> f
 
 @glue
 def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
-    """Fill exit points, free spans and free lengths of exact cables over pulleys from T_x and T_zA."""
+    """For exact cables over pulleys, fill exit points, free spans and free lengths from T_x and T_zA."""
     m = rows.shape[1]
     for i in range(m):  # T_zA
         rows[g.VERTICAL, i] -= cables[i, tables.DENSITY] * model.gravity * rows[g.ASKED_LENGTH, i]
@@ -132,7 +133,7 @@ def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
 
 @glue
 def _fill_free_span_ends(model: Model, cables: Array, rows: Array) -> None:
-    """Fill the ends of the free spans of exact cables, as `catenary_end`; loops for ordinary cables vectorize."""
+    """Fill the ends of the free spans of exact cables, like `catenary_end`, but in loops that vectorize."""
     m = rows.shape[1]
     for i in range(m):
         x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
@@ -176,7 +177,7 @@ def _end_errors(rows: Array) -> float:
 
 @glue
 def _length_errors(model: Model, cables: Array, rows: Array) -> float:
-    """`_end_errors` for shallow and weightless cables, which leave along the chord. 0 for weightless cables."""
+    """`_end_errors` of shallow and weightless cables, which leave a pulley along the chord; 0 for weightless cables."""
     largest = 0.0
     for i in range(rows.shape[1]):
         material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
@@ -200,22 +201,24 @@ def _length_errors(model: Model, cables: Array, rows: Array) -> float:
 
 @formula
 def _weight_per_length(model: Model, material: Material) -> float:
-    """Weight per length [N/m] of the cable between P and the drum; zero except for the exact cable."""
+    """Weight per length [N/m] of the cable between exit point P and drum; only the exact cable has weight there."""
     return material.density * model.gravity if model.code == codes.CATENARY else 0.0
 
 
 @formula
 def behind_at(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float]:
-    """Unstrained cable between P and the drum, after `update_from_equivalent_cables`."""
+    """Unstrained length between the exit point P and the drum. Call `_update_from_equivalent_cables` before."""
+    if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        return rows[g.WRAPPED, i], rows[g.LENGTH, i] - rows[g.FREE_LENGTH, i] - rows[g.WRAPPED, i]
     return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[g.LEAVING, i], _wrap_at(rows, i))
 
 
 @formula
 def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
-    """Motion of the platform end at a fixed force, x and z per meter of cable; then equivalent length per newton of H.
+    """Motion of the platform end per meter of cable at a fixed force (x, z), and equivalent length per newton of H.
 
     An increase of H stretches the part between P and the drum. The platform end then moves as if cable were paid out.
-    The third value is the length of this cable per newton of H.
+    The third value is the length of paid-out cable with this effect, per newton of H.
     """
     material, pulley = material_at(cables, i), pulley_at(cables, i)
     wrap, tension = _wrap_at(rows, i), rows[g.LEAVING, i]
@@ -229,7 +232,7 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
 
 @formula
 def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
-    """In-plane stiffness of cable `i`: its free span in series with the part between P and the drum."""
+    """In-plane stiffness of cable `i`: free span in series with the cable between the exit point P and the drum."""
     if not rows[g.LEAVING, i] > 0.0:
         return plane
     x, z, gives = end_motion_per_length(model, cables, rows, i)
@@ -255,7 +258,9 @@ def across_pulley(cables: Array, rows: Array, i: int) -> float:
 
 @formula
 def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
-    """Energy [J] that the part between P and the drum adds to the energy of the free span."""
+    """Energy [J] of the cable between exit point P and drum, which is added to the energy of the free span."""
+    if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        return energy_of_swivel(model, cables, rows, i)
     material, tension = material_at(cables, i), rows[g.LEAVING, i]
     weight, free = _weight_per_length(model, material), rows[g.FREE_LENGTH, i]
     return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, _wrap_at(rows, i), free)
@@ -283,13 +288,13 @@ def _square_share(part: float, length: float) -> float:
     return ratio * ratio
 
 
-# data of the cables to solve, m values each: span, rise and unstrained length [m], EA [N]
+# arrays (m,) of the cables that are solved: span, rise and unstrained length [m], EA [N]
 _EquivalentCables = tuple[Array, Array, Array, Array]
 
 
 @glue
 def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
-    """Two Halley steps for every cable from the stored parameter. The loop has one result, so that it vectorizes."""
+    """For every cable, two Halley steps from the stored parameter. The loop has one result, so that it vectorizes."""
     m = cables.shape[0]
     span, rise, length, stiffness = asked
     for i in range(m):
@@ -318,19 +323,22 @@ def _has_converged(rows: Array, i: int) -> bool:
 def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
 
-    `behind` is `Model.behind` as a separate argument. If it is None, the code for pulleys is not compiled.
+    `behind` is `Model.behind` as a separate argument. If `behind` is None, the code for pulleys is not compiled.
     """
     if behind is None:
         bare = (rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])
         _solve_equivalent_cables(model, cables, bare, rows)
+    elif tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        for i in range(cables.shape[0]):
+            solve_swivel(model, cables, rows, i)
     else:
         asked = (rows[g.ASKED_SPAN], rows[g.ASKED_RISE], rows[g.ASKED_LENGTH], rows[g.SOFT])
-        start_passes(cables, rows)
+        _start_passes(cables, rows)
         missed = math.inf
         for _ in range(PASSES):
-            fill_equivalent_cables(model, cables, rows)
+            _fill_equivalent_cables(model, cables, rows)
             _solve_equivalent_cables(model, cables, asked, rows)
-            missed = update_from_equivalent_cables(model, cables, rows)
+            missed = _update_from_equivalent_cables(model, cables, rows)
             if missed <= MISSED:
                 break
         if not missed <= MISSED:

@@ -9,7 +9,7 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.jit import entry, formula
+from sagline.kernels.jit import entry, formula, kernel
 
 # docs/model.md, section 1. Rows of a geometry array, each of m values.
 SPAN, RISE, CHORD, SINE, COSINE = 0, 1, 2, 3, 4  # x_B, z_B, D, sin phi, cos phi of the chord
@@ -38,9 +38,9 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
     """Length, sin phi and cos phi of the tangent from a pulley to a point. NaN if no tangent exists.
 
     The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
-    pulley. `entry` is +1 for a cable that enters from below. There is no tangent from a point inside the pulley or on
-    its near side. After half a turn on the pulley, the cable is vertical, and exit and entry are two radii apart. The
-    point is then exactly below the exit, or above the exit if the cable enters from above.
+    pulley. `entry` is +1 for a cable that enters from below. A point inside the pulley or on its near side has no
+    tangent. After half a turn on the pulley, the cable is vertical, and exit and entry are two radii apart. The point
+    is then exactly below the exit, or above the exit if the cable enters from above.
     """
     across = span - radius
     along = entry * rise
@@ -50,6 +50,24 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
     cosine = (radius * along + length * across) / square  # sin psi
     sine = entry * (length * along - radius * across) / square  # s cos psi
     return (length, sine, cosine) if cosine > 0.0 else (math.nan, math.nan, math.nan)
+
+
+@kernel
+def tangent_about(cables: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Vector from the pulley of cable `i` along the tangent to the point (`x`, `y`, `z`) relative to the frame anchor.
+
+    NaN if no tangent exists. The pulley swivels about the axis of the table, and is in the plane of axis and point.
+    """
+    radius = cables[i, tables.PULLEY_RADIUS]
+    if radius == 0.0:
+        return x, y, z
+    nx, ny, nz = cables[i, tables.AXIS_X], cables[i, tables.AXIS_Y], cables[i, tables.AXIS_Z]
+    along = x * nx + y * ny + z * nz
+    rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
+    across = math.sqrt(rx * rx + ry * ry + rz * rz)
+    length, up, out = tangent(radius, 1.0, across, along)
+    up, out = length * up, length * out / across if across > 0.0 else math.nan
+    return out * rx + up * nx, out * ry + up * ny, out * rz + up * nz
 
 
 @formula
@@ -69,7 +87,14 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
         span = math.sqrt(dx * dx + dy * dy)
         geometry[AZIMUTH_X, i] = dx / span if span > 0.0 else 1.0
         geometry[AZIMUTH_Y, i] = dy / span if span > 0.0 else 0.0
-        if cables[i, tables.PULLEY_RADIUS] > 0.0:
+        if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+            dx, dy, dz = tangent_about(cables, i, dx, dy, dz)
+            span = math.sqrt(dx * dx + dy * dy)
+            chord = math.sqrt(span * span + dz * dz)
+            sine, cosine = dz / chord, span / chord
+            geometry[AZIMUTH_X, i] = dx / span if span > 0.0 else 1.0
+            geometry[AZIMUTH_Y, i] = dy / span if span > 0.0 else 0.0
+        elif cables[i, tables.PULLEY_RADIUS] > 0.0:
             chord, sine, cosine = tangent(cables[i, tables.PULLEY_RADIUS], cables[i, tables.ENTRY], span, dz)
             span, dz = chord * cosine, chord * sine
         else:
@@ -87,7 +112,7 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
 
 @entry
 def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array, geometries: Array) -> None:
-    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); `rotation`: work array, (3, 3)."""
+    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m). `rotation`: work array, (3, 3)."""
     for p in range(poses.shape[0]):
         robot = robots[min(p, robots.shape[0] - 1)]
         body = bodies[min(p, bodies.shape[0] - 1)]
@@ -96,14 +121,13 @@ def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array
 
 LENGTH = GEOMETRY_ROWS  # unstrained length [m]
 HORIZONTAL, VERTICAL, TENSION = LENGTH + 1, LENGTH + 2, LENGTH + 3  # T_x, T_z, tau [N]
-STATUS = LENGTH + 4  # status of the cable
-# rows of `cable_forces`; PARAMETER is the h of the previous pose, or NaN if there is none
+STATUS = LENGTH + 4  # status of each cable from `cable_forces`, and h at the previous pose (NaN if there is none)
 PARAMETER, KAPPA, EXCESS, FIRST, SECOND = LENGTH + 5, LENGTH + 6, LENGTH + 7, LENGTH + 8, LENGTH + 9
 XX, XZ, ZX, ZZ = LENGTH + 10, LENGTH + 11, LENGTH + 12, LENGTH + 13  # in-plane stiffness [N/m]
-SOFT = LENGTH + 14  # EA of the cable that `cable_forces` solves [N]
+SOFT = LENGTH + 14  # EA of the cable in the equations of `cable_forces` [N]
 # Rows of cables over pulleys. The ASKED rows contain span, rise and length [m] of an equivalent cable without a pulley.
-# The OFF rows contain corrections [m] of span, rise and length, with which both cables have equal forces. The next
-# pose starts with these corrections.
+# The OFF rows contain corrections [m] of span, rise and length. With them, the equivalent cable has the forces of the
+# real cable. The next pose starts with these corrections.
 ASKED_SPAN, ASKED_RISE, ASKED_LENGTH = LENGTH + 15, LENGTH + 16, LENGTH + 17
 OFF_X, OFF_Z, OFF_LENGTH = LENGTH + 18, LENGTH + 19, LENGTH + 20
 FREE_SPAN, FREE_RISE, FREE_LENGTH = LENGTH + 21, LENGTH + 22, LENGTH + 23  # of the free span [m]
@@ -112,3 +136,10 @@ LEAVING, TOTAL = LENGTH + 27, LENGTH + 28  # tension T_A at the exit point, and 
 BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # length between chord and drum; end of the free span [m]
 ACROSS = LENGTH + 32  # stiffness normal to the plane [N/m]
 CABLE_ROWS = LENGTH + 33
+# Cables with a swivel axis of any direction use rows of the passes, which they do not need, for numbers in world axes:
+# stiffness [N/m]; dT/dL [N/m]; force at the platform end [N]; unstrained length on the pulley [m].
+W_XX, W_XY, W_XZ, W_YY, W_YZ, W_ZZ = ASKED_SPAN, ASKED_RISE, ASKED_LENGTH, OFF_X, OFF_Z, OFF_LENGTH
+LONGER_X, LONGER_Y, LONGER_Z = KAPPA, EXCESS, FIRST
+FORCE_X, FORCE_Y, FORCE_Z = SECOND, END_X, END_Z
+END_AT_X, END_AT_Y, END_AT_Z = XX, XZ, ZX  # platform end relative to the anchor at the last solution [m]
+WRAPPED = BEHIND

@@ -1,10 +1,10 @@
 """One cable of any model: length from tension, and force from length; docs/model.md, sections 2 and 3.
 
 Forces act on the cable at its platform end; z points up. The equations of the elastic catenary (Irvine) are written in
-ratios that stay regular as the weight per length w goes to zero, and are solved without cancellation.
+ratios. The ratios stay regular as the weight per length w goes to zero, and are computed without cancellation.
 
-The shallow cable is a straight line of tension tau plus a vertical force b on its platform end. The same equations are
-used for the parabolic model (b = wD/2, k = g^2/24, stretching tension tau) and the empirical model (b = k_h rho D, k =
+The shallow cable is a straight line of tension tau plus a vertical force b on its platform end. The following equations
+apply to the parabolic model (b = wD/2, k = g^2/24, stretching tension tau) and the empirical model (b = k_h rho D, k =
 k_p, stretching tension |T|):
 
     T = tau (cos phi, sin phi) + (0, b)
@@ -30,7 +30,7 @@ CATENARY_STEPS = 80
 # Halley's method cubes it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
-SPLIT = 134217729.0  # 2^27 + 1, a factor that splits a mantissa into halves
+SPLIT = 134217729.0  # 2^27 + 1, factor that splits the mantissa of a number into two halves
 
 
 @kernel
@@ -50,7 +50,7 @@ def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_
 def catenary_end(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> tuple[float, float]:
-    """P1: position (x, z) of the platform end from the force on it and the unstrained length."""
+    """P1: position (x, z) of the platform end, on which the force (`horizontal`, `vertical`) acts."""
     vertical_a = vertical - weight * length
     tension_a = math.hypot(horizontal, vertical_a)
     tension_b = math.hypot(horizontal, vertical)
@@ -87,9 +87,9 @@ def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: fl
 
 @formula
 def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
-    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; up to e = 0.1, add a third step.
+    """L/D from P3 by two Newton steps, for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01. Up to e = 0.1, add a third step.
 
-    Without branches and inner loops, a loop over cables vectorizes.
+    The function has no branches and no inner loops, so that a loop over cables vectorizes.
     """
     cosine2 = cosine * cosine
     sine2 = sine * sine
@@ -103,13 +103,13 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """One Newton step from the approximate `ratio`: the ratio at a similar tension, or the result of two steps."""
+    """Ratio L/D after one Newton step from `ratio`, which is the ratio at a similar tension or after two steps."""
     return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
 @kernel
 def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> tuple[float, int]:
-    """P3 for any cable: L/D and a status, by Newton steps within two bounds of the solution."""
+    """L/D and status of any cable from P3, by Newton steps that stay between two bounds of the solution."""
     if is_ordinary(half_weight, strain):
         ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
         if strain > TAUT_STRAIN:
@@ -172,7 +172,7 @@ def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, rat
 
 @formula
 def _product_error(a: float, product: float) -> float:
-    """a*a - product exactly; product is a*a with rounding (Dekker)."""
+    """Exact value of a*a - product, where `product` is a*a after rounding (Dekker)."""
     split = SPLIT * a
     high = split - (split - a)
     low = a - high
@@ -181,7 +181,7 @@ def _product_error(a: float, product: float) -> float:
 
 @formula
 def relative_excess(span: float, rise: float, length: float) -> float:
-    """Value of (D^2 - L^2)/L^2 without rounding error in the difference."""
+    """Value of (D^2 - L^2)/L^2. The difference is computed without rounding error."""
     x2 = span * span
     z2 = rise * rise
     l2 = length * length
@@ -197,7 +197,7 @@ def relative_excess(span: float, rise: float, length: float) -> float:
 
 @formula
 def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> float:
-    """Initial value of h: root of xi^2 h^3/3 + excess h = 2 kappa (1 + excess), or the asymptote for deep sag."""
+    """Initial value of h: root of xi^2 h^3/3 + excess h = 2 kappa (1 + excess); for deep sag, the asymptote."""
     scale = 3.0 / (xi * xi)
     p = scale * excess
     q = 2.0 * scale * kappa * (1.0 + excess)
@@ -217,7 +217,7 @@ def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> flo
 def closure_error(
     h: float, functions_of_h: tuple[float, float, float], xi2: float, zeta2: float, kappa: float, excess: float
 ) -> tuple[float, float, float]:
-    """Error of P2 at h, and its first and second derivatives; `functions_of_h`: sinh h, sinh h - h, and cosh h."""
+    """Error of P2 at h, and its first and second derivatives. `functions_of_h`: sinh h, sinh h - h, and cosh h."""
     s, more, c = functions_of_h
     total = 1.0 / (h + kappa)
     lever = 1.0 / (s + kappa * c)
@@ -250,7 +250,7 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
             high = h
         else:
             low = h
-        if error > 1.0:  # the function is nearly exponential here, and Newton steps solve for its logarithm
+        if error > 1.0:  # the function is nearly exponential here; Newton's method is applied to its logarithm
             new = h - math.log1p(error) * (1.0 + error) / slope
         else:  # Halley
             new = h - error * slope / (slope * slope - error * bend)
@@ -265,7 +265,7 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
 
 @formula
 def _vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
-    """P2 on a vertical chord, in closed form. Returns vertical force, chord tension and a status."""
+    """Solution of P2 for a vertical chord, in closed form. Returns vertical force, chord tension and a status."""
     height = abs(rise)
     kappa = 0.5 * weight * length / stiffness
     stretch = (height - length) / length  # exact difference for a taut cable
@@ -300,7 +300,7 @@ SHALLOW_STEPS = 60
 
 @kernel
 def stretching_tension(tension: float, sine: float, cosine: float, sag_force: float) -> float:
-    """Magnitude of the force on the platform end [N]. If `sag_force` is 0, this is the chord tension."""
+    """Magnitude of the force on the platform end [N], equal to the chord tension if `sag_force` is 0."""
     return math.hypot(tension * cosine, tension * sine + sag_force)
 
 
@@ -308,18 +308,18 @@ def stretching_tension(tension: float, sine: float, cosine: float, sag_force: fl
 def shallow_length_ratio(
     tension: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float
 ) -> float:
-    """Ratio L/D. `sag`: k (rho D cos phi)^2 [N^2]; `sag_force`: b [N] if it is part of the stretching tension, or 0."""
+    """Ratio L/D. `sag`: k (rho D cos phi)^2 [N^2]. `sag_force`: b [N] if the stretching tension includes it, else 0."""
     return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, sag_force) / stiffness)
 
 
 @kernel
-def shallow_tension(
+def _shallow_tension(
     chord: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float, length: float
 ) -> tuple[float, bool]:
     """Chord tension of a shallow cable of the length `length`, and True if this tension was found.
 
-    The first Newton steps use the cubic equation of the parabolic model and start above its root. The other steps use
-    the length of the cable model and stay within two bounds. A cable without sag that is longer than its chord has no
+    The first Newton steps solve the cubic equation of the parabolic model, from above its root. The later steps use the
+    length of the cable's own model and stay within two bounds. A cable without sag that is longer than its chord has no
     tension.
     """
     p = (length - chord) / length * stiffness
@@ -369,7 +369,7 @@ def shallow_sag_force(model: Model, chord: float, density: float) -> float:
 
 @kernel
 def sag_of_shallow(model: Model, line: float) -> float:
-    """The product k (rho D cos phi)^2 [N^2] of the shallow models; `line`: rho D cos phi [kg]."""
+    """The product k (rho D cos phi)^2 [N^2] of the shallow models. `line`: rho D cos phi [kg]."""
     k = model.k_p if model.code == codes.EMPIRICAL else model.gravity * model.gravity / 24.0
     return k * line * line
 
@@ -400,7 +400,7 @@ def from_tension(model: Model, chord: Chord, material: Material, tension: float)
 
 @kernel
 def from_length(model: Model, span: float, rise: float, material: Material, length: float) -> tuple[Force, int]:
-    """Force on the platform end, and status, of a cable of the length `length`."""
+    """Force on the platform end of a cable with the unstrained length `length`, and a status."""
     if model.code == codes.STRAIGHT:
         return Force(math.nan, math.nan, math.nan), codes.CABLE_NO_TENSION
     weight = material.density * model.gravity
@@ -416,7 +416,7 @@ def from_length(model: Model, span: float, rise: float, material: Material, leng
     sag_force = shallow_sag_force(model, chord, material.density)
     sag = sag_of_shallow(model, material.density * chord * cosine)
     stretch_force = sag_force if model.code == codes.EMPIRICAL else 0.0
-    tension, found = shallow_tension(chord, sine, cosine, stretch_force, sag, material.stiffness, length)
+    tension, found = _shallow_tension(chord, sine, cosine, stretch_force, sag, material.stiffness, length)
     status = codes.CABLE_SOLVED
     if not found:
         status = codes.CABLE_NOT_CONVERGED

@@ -2,9 +2,9 @@
 
 The cable enters the pulley at the anchor A. The pulley swivels about the vertical axis through A, and is therefore in
 the cable's vertical plane. The cable leaves the pulley at the point P in the direction of the force F_A = (T_x, T_zA)
-at P. This force alone determines P. The model has no friction. H = T + T^2/(2 EA) - w z is therefore constant along the
-whole cable. The derivative of the cable's energy with respect to its length is -H. With beta = w R/EA and E_A = 1 +
-T_A/EA, the neglected terms on the pulley are of the order R beta^2.
+at P. The position of P depends only on F_A. The model has no friction. H = T + T^2/(2 EA) - w z is therefore constant
+along the whole cable. The derivative of the cable's energy with respect to its length is -H. With beta = w R/EA and E_A
+= 1 + T_A/EA, the neglected terms on the pulley are of the order R beta^2.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model, PlaneVector, Pulley
 from sagline.kernels.jit import formula, kernel
 
-# changes of the parameters of one cable: L [m], w [N/m], EA [N], R [m], dead length [m]
+# changes of a cable's parameters, in this order: L [m], w [N/m], EA [N], R [m], dead length [m]
 Change = tuple[float, float, float, float, float]
 
 LEAST_TURNED = -0.8  # smallest derivative in a Newton step; a derivative near -1 would turn the cable too far
+LARGE = 0.5  # cosine of the largest step that is not halved: 60 degrees
+VERTICAL = -0.999  # cosine of a step between the two directions of a vertical cable, which is not halved
 
 
 class Wrap(NamedTuple):
@@ -51,13 +53,13 @@ def robots_have_machine(robots: Array) -> bool:
 
 @formula
 def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
-    """Horizontal distance from the exit point to the platform end [m]; `cosine`: cos psi; `chord`: the tangent."""
+    """Horizontal distance [m] from exit point to platform end. `chord`: tangent to the pulley. `cosine`: cos psi."""
     return chord.length * chord.cosine + pulley.radius * (cosine - pulley.entry * chord.sine)
 
 
 @formula
 def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
-    """Height of the platform end above the exit point [m]; `sine`: sin psi."""
+    """Height of the platform end above the exit point [m]. `sine`: sin psi."""
     return chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - sine))
 
 
@@ -67,11 +69,15 @@ def exit_after(
 ) -> tuple[float, float]:
     """Sine and cosine of the wrap angle after one Newton step.
 
-    force: T_x and T_zA of the cable at the wrap angle before the step. If the wrap angle grows by d, the free span
-    becomes shorter by R d/E_A, and T_zA grows by the weight of this length.
+    If the wrap angle grows by d, the free span becomes shorter by R d/E_A, and T_zA grows by the weight of this length.
+    Large steps are halved, because the exit point of a slack cable could otherwise move back and forth without end.
+
+    force: T_x and T_zA of the cable at the wrap angle before the step.
     """
     horizontal, vertical_a = force
     tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+    if tension == 0.0 or horizontal < 0.0:  # a weightless cable without tension, or with a rounding error of it
+        return before
     inverse = 1.0 / tension
     # minus the derivative of the force's angle with respect to the wrap angle
     turned = pulley.entry * before[0] * weight * pulley.radius * inverse / (1.0 + tension / stiffness)
@@ -79,7 +85,12 @@ def exit_after(
     sine = before[0] + share * (horizontal * inverse - before[0])
     cosine = before[1] + share * (pulley.entry * vertical_a * inverse - before[1])
     inverse = 1.0 / math.sqrt(sine * sine + cosine * cosine)
-    return sine * inverse, cosine * inverse
+    sine, cosine = sine * inverse, cosine * inverse
+    turn = sine * before[0] + cosine * before[1]  # cosine of the angle of the step
+    if VERTICAL < turn < LARGE:
+        inverse = 1.0 / math.sqrt(2.0 + 2.0 * turn)
+        sine, cosine = (before[0] + sine) * inverse, (before[1] + cosine) * inverse
+    return sine, cosine
 
 
 @formula
@@ -98,7 +109,7 @@ def from_axis(pulley: Pulley, chord: Chord) -> float:
 def _strains(
     pulley: Pulley, weight: float, stiffness: float, tension: float, sine: float
 ) -> tuple[float, float, float]:
-    """Stretch E = 1 + e at P, at the entry of the pulley, and at the drum; `sine`: sin psi."""
+    """Stretch E = 1 + e (e: strain) at exit point, at the pulley's entry, and at the drum. `sine`: sin psi."""
     leaving = 1.0 + tension / stiffness
     entering = math.sqrt(leaving * leaving - 2.0 * pulley.entry * weight * pulley.radius / stiffness * sine)
     return leaving, entering, math.sqrt(entering * entering - 2.0 * weight * pulley.rise / stiffness)
@@ -106,7 +117,7 @@ def _strains(
 
 @formula
 def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> tuple[float, float]:
-    """Unstrained lengths on the pulley and between drum and pulley; `tension` at P [N]; `weight` per length [N/m]."""
+    """Unstrained lengths on the pulley and between drum and pulley. `tension`: at P [N]. `weight`: per length [N/m]."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     beta = weight * pulley.radius / stiffness
     falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
@@ -116,7 +127,7 @@ def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap
 
 @formula
 def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> tuple[float, float]:
-    """`behind` for any model: only the exact cable has weight beyond P, and the straight cable does not stretch."""
+    """`behind` for any model. Between P and drum, only an exact cable has weight. A straight cable does not stretch."""
     if model.code == codes.STRAIGHT:
         return pulley.radius * wrap.angle, pulley.dead
     weight = material.density * model.gravity if model.code == codes.CATENARY else 0.0
@@ -125,7 +136,7 @@ def behind_cable(model: Model, material: Material, pulley: Pulley, tension: floa
 
 @formula
 def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
-    """Compliance S [m/N]: unstrained length that the part beyond P releases per newton of H. P moves by E_A^2 S."""
+    """Compliance S [m/N] of the cable between P and drum: length released per newton of H. P moves by E_A^2 S."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     on_pulley = pulley.radius * wrap.angle / (strained * strained * strained)
     return (on_pulley + 2.0 * pulley.dead / ((first + last) * first * last)) / stiffness
@@ -133,7 +144,7 @@ def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wr
 
 @formula
 def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap, free: float) -> float:
-    """Energy [J] of the part beyond P, and the energy to lift the free span (unstrained length `free`) from A to P."""
+    """Energy [J] of the cable between P and drum, plus energy to lift the free span (unstrained length `free`) to P."""
     radius, entry, dead, _rise = pulley
     strained, entering, drawn = _strains(pulley, weight, stiffness, tension, wrap.sine)
     first, last = entering - 1.0, drawn - 1.0
@@ -155,10 +166,10 @@ def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: floa
 def _length_behind_by(
     pulley: Pulley, weight: float, stiffness: float, force: Force, free: float, change: Change, grown: float
 ) -> tuple[float, float]:
-    """Changes of psi and of the unstrained length beyond P at a fixed force on the platform end.
+    """Changes of psi and of the unstrained length between P and drum, at a fixed force on the platform end.
 
-    weight: weight per length [N/m]; stiffness: EA [N]; free: unstrained length of the free span [m]; change: changes of
-    the parameters (the length has no effect here); grown: increase of the free span's unstrained length.
+    `weight`: weight per length [N/m]. `stiffness`: EA [N]. `free`: unstrained length of the free span [m]. `change`:
+    changes of the parameters (the length has no effect here). `grown`: increase of the free span's unstrained length.
     """
     radius, entry, dead, rise = pulley
     _length, weight_by, stiffness_by, radius_by, dead_change = change
@@ -193,7 +204,7 @@ def end_by(
 ) -> PlaneVector:
     """Motion of the platform end due to a change of cable data, at a fixed force on the end; docs/model.md, section 10.
 
-    by_weight: motion per change of w at a fixed free length [m^2/N].
+    `by_weight`: motion per change of w at a fixed free length [m^2/N].
     """
     length_by, weight_by, stiffness_by, radius_by, _dead = change
     vertical_a = force.vertical - weight * free
@@ -204,7 +215,7 @@ def end_by(
     more = _length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
     grown = (length_by - still) / (1.0 + more)
     turned = _length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
-    # cable is added to the free span at P, where its stretch is E_A, and P moves along the tangent
+    # cable enters the free span at P with the stretch E_A, and P moves along the tangent
     feed = strained * grown + pulley.radius * turned
     softer = -free * stiffness_by / (material.stiffness * material.stiffness)
     x = softer * force.horizontal + by_weight.x * weight_by

@@ -2,8 +2,8 @@
 
 If the platform end of a cable is below its frame end, its sag force is not monotone in the tension. The sag force falls
 while the sag is deep, rises while the sag becomes shallow, and falls again because of the stretch. On a range of
-tensions, its largest and smallest values are at an end of the range or at one of at most two extrema; docs/model.md,
-section 5.
+tensions, the largest and the smallest sag force are at an end of the range or at an extremum. The sag force has at most
+two extrema; docs/model.md, section 5.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from sagline.kernels.memory import Memory, block
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
 SHRINKINGS = 30
 TURN_ERROR = 1e-10  # bound of the error of the sag force at an extremum, relative to half the cable's weight
-SHRINKS = 0.9  # the search ends if the ratio of a section to the section before it is larger
-SMALLEST_GAIN = 1e-15  # relative to the terms of the sum; the search ends if the decrease of the bound is smaller
+SHRINKS = 0.9  # the search ends if a section is longer than this fraction of the previous section
+SMALLEST_GAIN = 1e-15  # the search ends if the bound decreases by less than this fraction of the terms of its sum
 
 # Rows of the extrema of the cables' sag forces, (TURN_ROWS, m); NaN if a cable has no such extremum.
 LEAST_TENSION, LEAST_SAG_FORCE, MOST_TENSION, MOST_SAG_FORCE = 0, 1, 2, 3
@@ -68,7 +68,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
     for i in range(tau.size if change > SAME_EXIT else 0):
         curves.statuses[i] = codes.CABLE_NOT_CONVERGED
     for i in range(tau.size):
-        if curves.model.code != codes.CATENARY:  # the sag force is the same at every tension, including zero
+        if curves.model.code != codes.CATENARY:  # this model has the same sag force at every tension, including zero
             curves.cables.sag_force[i] = shallow_sag_force(
                 curves.model, curves.cables.chord[i], curves.cables.density[i]
             )
@@ -77,7 +77,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
 
 @kernel
 def _sag_forces_beside(curves: Curves, tau: Array, above: Array) -> None:
-    """Fill the sag forces slightly above the chord tensions `tau`, and slightly below them in `curves.cables`."""
+    """Fill `above` with the sag forces slightly above `tau`, and `curves.cables` with those slightly below `tau`."""
     cables = curves.cables
     for i in range(tau.size):
         cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
@@ -106,7 +106,7 @@ def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
 
 @kernel
 def sag_force_at(curves: Curves, i: int, tau: float) -> float:
-    """Sag force of cable `i` at the chord tension `tau` [N]. Zero at an infinite tension, which means no length."""
+    """Sag force [N] of cable `i` at the chord tension `tau` [N]; zero at infinite tension, where no length exists."""
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
         return shallow_sag_force(curves.model, cables.chord[i], cables.density[i])
@@ -133,12 +133,12 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along * tau - b * sag_force(tau) on a section [N]; exact if the maximum is at an end.
+    """Upper bound [N] of along * tau - b * sag_force(tau) on a section. The bound is exact if the maximum is at an end.
 
-    The value at one end and the range of the sag force give the largest distance to a better tension. The section is
-    shortened to this distance, and the step is repeated.
+    The value at one end and the range of the sag force limit how far a better tension can be from this end. The section
+    is shortened to that distance, again and again.
 
-    section: range of chord tensions, whose upper end may be infinite; along, b: factors of chord tension and sag force.
+    `section`: range of chord tensions, whose upper end may be infinite; `along`, `hanging`: the factors along and b.
     """
     low, high, at_low, at_high = section
     if along > 0.0 and high == math.inf:
@@ -172,10 +172,10 @@ GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # at 0.28 to 1.03 times this X and at 0.58 to 1.0 times this tension.
 START_OF_LEAST, START_OF_MOST = 1.25, 0.9
 # Limit of the growth of the sag force at its first-order peak, relative to the sum of its terms. In all random cables
-# of the tests, the growth changes by a smaller share from this peak to the exact peak. If the growth is below minus
-# this limit, it is negative everywhere; otherwise golden sections search the exact peak.
+# of the tests, the growths at this peak and at the exact peak differ by a smaller share. If the growth is below minus
+# this limit, it is negative everywhere; otherwise a golden-section search finds the exact peak.
 FALLS_FOR_SURE = 0.3
-FIRST_ORDER = 1.0  # largest X at which the first order is used; a steep cable has its first-order peak at a larger X
+FIRST_ORDER = 1.0  # largest X at which the first order is used; the first-order peak of a steep cable is at a larger X
 
 # Rows of the work array.
 A, B, AT_A, AT_B, TENSION, GROWTH, RISEN, LAST = 0, 1, 2, 3, 4, 5, 6, 7
@@ -209,9 +209,9 @@ def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, floa
 
 @kernel
 def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> float:
-    """Chord tension between `low` and `high`, where the sag force falls, at which it rises. NaN if it never rises.
+    """Chord tension between `low` and `high` at which the sag force rises; it falls at both. NaN if it never rises.
 
-    The growth of the sag force has one peak, which golden sections find.
+    The growth of the sag force has one peak. Golden-section search finds it.
     """
     a, b = math.log(low), math.log(high)
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
@@ -265,11 +265,11 @@ def _find_rises(curves: Curves, work: Array) -> None:
 def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, sag_forces: Array) -> None:
     """Fill tension and sag force at the extremum between A and B, for the cables whose tension is not NaN.
 
-    The steps start at TENSION and stay within the remaining range from A to B. The first step uses the first-order
-    slope. Each later step uses the slope between the last two points.
+    The steps start at the tensions in row TENSION and stay between the tensions in rows A and B. The first step uses
+    the first-order slope. Each later step uses the slope between the last two points.
 
-    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: filled, (m,), except for
-    cables that have NaN and are skipped; sag forces: filled, (m,).
+    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: filled, (m,); a cable with
+        NaN is skipped; sag forces: filled, (m,).
     """
     m = tensions.size
     for step in range(STEPS):

@@ -1,10 +1,10 @@
 """Cables at chord tensions: length ratios, sag forces, lengths off the drums, and admissible tensions.
 
 The admissible tensions of a cable at a pose form one interval for all tests of feasibility; docs/model.md, section 5.
-Its ends follow from the robot's limits, a limit of the sag and a limit of the stretch. Limits of the frame-end tension
-are converted to limits of the chord tension. As the chord tension grows, the frame-end tension first falls and then
-rises. Usually the interval contains only tensions on the rising side. If no frame-end tension is below the lower limit,
-it also contains tensions on the falling side.
+The ends of the interval follow from the robot's limits, a limit of the sag and a limit of the stretch. Limits of the
+frame-end tension are converted to limits of the chord tension. As the chord tension grows, the frame-end tension first
+falls and then rises. Usually the interval contains only tensions on the rising side. If no frame-end tension is below
+the lower limit, the interval also contains tensions on the falling side.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sagline.kernels import codes
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import models
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.pulley import Wrap, behind_cable, exit_after, free_rise, free_span, pulley_at
+from sagline.kernels.cable.pulley import Wrap, behind_cable, exit_after, free_rise, free_span, from_axis, pulley_at
 from sagline.kernels.cable.terms import (
     Cables,
     Chord,
@@ -35,26 +35,26 @@ from sagline.kernels.cable.terms import (
 )
 from sagline.kernels.jit import entry, formula, glue, kernel
 
-# Relative change of tension up to which one Newton step from the last ratio suffices. The relative error of the ratio
-# is then 3e-8 at X = 2 and 5e-15 at X = 0.01. The error is proportional to the square of the change, so that converged
-# iterations have full precision.
+# Largest relative change of tension after which one Newton step from the last ratio is sufficient. The relative error
+# of the ratio is then 3e-8 at X = 2 and 5e-15 at X = 0.01. The error is proportional to the square of the change, so
+# that converged iterations have full precision.
 NEAR = 1e-3
 CONTACTS = 40  # largest number of passes for the exit point; for a taut cable, three are sufficient
-SAME_EXIT = 1e-9  # largest change of the exit direction that counts as converged; the remaining error is its square
+SAME_EXIT = 1e-9  # largest change of the exit direction after convergence; the remaining error is its square
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative tolerance, larger than the remaining error of a slack cable after all passes
-SECANT = 1e-6  # smallest relative step of a secant; the slope of a shorter secant is mostly rounding error
+SECANT = 1e-6  # smallest relative step of a secant; the slope of a shorter secant would be mostly rounding error
 TAUT = 1.25  # chord tension in units of wD/2 that is larger than the chord tension with the least frame-end tension
 
 
 @glue
 def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
-    """Fill the free spans and their tensions; the forces at the pulleys determine the exit points.
+    """Fill the free spans and their tensions. The exit points follow from the forces at the pulleys.
 
-    The forces follow from the last lengths and sag forces at the present chord tensions. If `fresh` is true, these do
-    not exist yet, and first-order values are used. Cables of the shallow models leave along their chord. Returns the
-    largest change of a direction.
+    The forces are computed from the chord tensions and from the last lengths and sag forces. If `fresh` is true, no
+    lengths and sag forces exist yet, and first-order values are used. Cables of the shallow models leave the pulley
+    along their chord. Returns the largest change of an exit direction.
     """
     exact = model.code == codes.CATENARY
     change = 0.0
@@ -91,12 +91,12 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
 def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> tuple[int, float]:
     """Fill slackness, strain, ratio and sag force of all cables, and the statuses (m,), at their chord tensions.
 
-    Loops without branches, which vectorize, solve ordinary catenaries. The other cables are then solved one by one. The
-    exit points follow from the previous lengths and sag forces.
+    Loops without branches, which vectorize, solve ordinary catenaries. The cables that are not ordinary are then solved
+    one by one. The exit points follow from the previous lengths and sag forces.
 
-    fresh: True if lengths and sag forces do not exist yet; near: True if the tensions have changed by less than NEAR
-    since the last ratios; statuses: filled. Returns the most serious status, and the largest change of the direction in
-    which a cable leaves its pulley.
+    `fresh`: True if lengths and sag forces do not exist yet. `near`: True if the tensions have changed by less than
+    NEAR since the last ratios. `statuses`: filled. Returns the most serious status, and the largest change of the
+    direction in which a cable leaves its pulley.
     """
     m = cables.tau.size
     change = _fill_exit_points(model, cables, fresh) if cables.machine else 0.0
@@ -173,7 +173,7 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 
 @kernel
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
-    """Chord tension at which the tension at the frame end has a given value, on the taut side.
+    """Chord tension at which the tension at the frame end is `tension`, on the taut side.
 
     If every frame-end tension is larger, the result is the chord tension at which a parabola has its least frame-end
     tension.
@@ -186,13 +186,13 @@ def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, p
 def taut_at_frame_end(
     model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, otherwise: float
 ) -> float:
-    """Chord tension at which the tension at the frame end has a given value, on the taut side.
+    """Chord tension at which the tension at the frame end is `tension`, on the taut side.
 
-    The frame-end tension of a sagging cable has a least value, at most 3/4 wD cos(phi). It is convex in the chord
-    tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore go down to the root, or to the
-    least value.
+    The frame-end tension of a sagging cable has a least value, at most 3/4 wD cos(phi). The frame-end tension is a
+    convex function of the chord tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore
+    descend to the root, or to the least frame-end tension.
 
-    tension: frame-end tension [N]; otherwise: value to return if every frame-end tension is larger.
+    `tension`: frame-end tension [N]. `otherwise`: value to return if every frame-end tension is larger.
     """
     weight = material.density * model.gravity
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:
@@ -225,8 +225,7 @@ def hold_cable(
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
     horizontal, vertical = tau * chord.cosine, tau * chord.sine + sag_force - weight * length
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
-    # with the shallow models, a cable leaves along its chord, and its tension between chord and drum is the chord
-    # tension
+    # in the shallow models, a cable leaves its pulley along the chord, and has the chord tension between chord and drum
     sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
     if model.code == codes.CATENARY:
         there = tension
@@ -249,9 +248,9 @@ def lengths_at_frame_ends(
 ) -> None:
     """Unstrained lengths off the drums [m] of cables at a pose; each cable is computed separately.
 
-    tension: tensions at the frame ends [N], (m,); tension_out: filled with the frame-end tensions at these lengths [N],
-    (m,). They differ from given tensions that are below the least possible tension. length_out: filled with the lengths
-    [m], (m,); rotation, geometry: work arrays, (3, 3) and (GEOMETRY_ROWS, m).
+    `tension`: tensions at the frame ends [N], (m,). `tension_out`: filled with the frame-end tensions at the found
+    lengths [N], (m,). If a given tension is below the least possible tension, the result differs from it. `length_out`:
+    filled with the lengths [m], (m,). `rotation`, `geometry`: work arrays, (3, 3) and (GEOMETRY_ROWS, m).
     """
     model = model_of(terms)
     cable_geometry(cables, body, pose, rotation, geometry)
@@ -262,9 +261,9 @@ def lengths_at_frame_ends(
 
 
 LOOSEST = 5.0  # largest X = wD/(2 tau): a cable that is fifteen times as long as its chord and almost without tension
-# Largest strain, at which a cable is twice as long as without tension. It applies if the robot has no upper limit.
+# Largest strain: the cable is twice as long as without tension. It applies if the robot has no upper limit.
 LARGEST_STRAIN = 1.0
-SMALLEST = 1e-100  # smallest chord tension of a catenary without weight [N]; the equations divide by the tension
+SMALLEST = 1e-100  # smallest chord tension of a catenary without weight [N]; the equations divide by this tension
 SECTIONS = 80  # steps of the search for the smallest admissible tension of a slack cable
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 PRECISION = 1e-14  # relative
@@ -280,7 +279,7 @@ class TensionLimits(NamedTuple):
 
 @formula
 def sags(model: Model, half_weight: float) -> bool:
-    """True if a cable sags. Its length is then infinite at zero tension. `half_weight`: wD/2 [N]."""
+    """True if a cable sags, which means an infinite length at zero tension. `half_weight`: wD/2 [N]."""
     return half_weight > 0.0 and model.code != codes.STRAIGHT and model.code != codes.ELASTIC
 
 
@@ -293,7 +292,7 @@ def least_of_sag(model: Model, half_weight: float) -> float:
 
 
 @formula
-def largest_of_strain(model: Model, stiffness: float) -> float:
+def _largest_of_strain(model: Model, stiffness: float) -> float:
     """Largest chord tension of a cable without an upper limit [N]."""
     return LARGEST_STRAIN * stiffness if model.code != codes.STRAIGHT else math.inf
 
@@ -316,22 +315,40 @@ def cable_without_tension(cables: Cables) -> int:
     return -1
 
 
+@formula
+def _slackness_beside_axis(chord: Chord, pulley: Pulley) -> float:
+    """Smallest 1/X of a cable whose platform end is above the pulley and nearer to the swivel axis than its diameter.
+
+    A slack cable leaves the pulley farther from the axis than a taut one, and cannot leave it beyond the platform end.
+    To first order, this bound keeps half the horizontal distance between the two ends. It is zero for other cables.
+    """
+    span = chord.length * chord.cosine
+    away = max(from_axis(pulley, chord) - 0.5 * span, SAME_EXIT * pulley.radius)
+    if not (min(pulley.entry, chord.sine) > 0.0 and away < 2.0 * pulley.radius):
+        return 0.0
+    cosine = 1.0 - away / pulley.radius
+    sine = math.sqrt(1.0 - cosine * cosine)
+    return sine / (chord.sine * sine - chord.cosine * cosine)
+
+
 @glue
 def fill_admissible_tensions(
     model: Model, limits: TensionLimits, low: float, high: float, cables: Cables, i: int
 ) -> None:
-    """Fill the smallest and largest admissible chord tension of cable `i`. If none is admissible: smallest > largest.
+    """Fill the smallest and largest admissible chord tension of cable `i`; smallest > largest if none is admissible.
 
-    low, high: limits of the robot [N]; the upper limit may be infinite.
+    `low`, `high`: limits of the robot [N]; the upper limit may be infinite.
     """
     half_weight = cables.half_weight[i]
     # the free span of a slack cable over a pulley can be longer than the tangent by one diameter
     floor = least_of_sag(model, half_weight + cables.density[i] * model.gravity * cables.radius[i])
+    chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
+    if sags(model, half_weight):
+        floor = max(floor, half_weight * _slackness_beside_axis(chord, pulley))
     if limits.quantity == codes.LIMITS_OF_FRAME_END and sags(model, half_weight):
-        chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
         low, high = _limits_at_chord(model, chord, material, pulley, low, high, floor)
     if high == math.inf:
-        high = largest_of_strain(model, cables.stiffness[i])
+        high = _largest_of_strain(model, cables.stiffness[i])
     if not math.isnan(limits.validity):
         # the horizontal tension T_x of a vertical cable is zero, which also satisfies a T_adj of zero
         margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0
@@ -344,7 +361,7 @@ def fill_admissible_tensions(
 def _limits_at_chord(
     model: Model, chord: Chord, material: Material, pulley: Pulley, low: float, high: float, floor: float
 ) -> tuple[float, float]:
-    """Limits of the chord tension [N] that follow from limits of the frame-end tension.
+    """Convert limits of the frame-end tension to limits of the chord tension [N].
 
     Returns infinity and zero if the frame-end tension is above its upper limit at every chord tension.
     """
@@ -363,9 +380,9 @@ def _slackest_at_frame_end(
 ) -> float:
     """Smallest chord tension [N] of the range in which the frame-end tension is at most `tension`.
 
-    Golden sections find a chord tension inside the range, and then its smallest chord tension.
+    A golden-section search finds a chord tension inside the range. A second search finds the range's lower end.
 
-    floor: lower bound of the result [N]; taut: largest chord tension of the range, on the rising side [N].
+    `floor`: lower bound of the result [N]. `taut`: largest chord tension of the range, on the rising side [N].
     """
     if tension == math.inf or frame_end_tension(model, chord, material, pulley, floor) <= tension:
         return min(floor, taut)

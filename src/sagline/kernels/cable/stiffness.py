@@ -1,9 +1,9 @@
 """Stiffness dT/dB of one cable, its potential energy, and dT/d(L, rho, EA); docs/model.md, section 6.
 
-In the vertical plane of the cable the stiffness is a 2 x 2 matrix. Normal to this plane it is T_x/x_B = tau/D, which is
-regular on a vertical chord. For the weightless and the exact cable, the force on the platform end is the gradient of an
-energy. The forces of the shallow models are not a gradient. The curl of the parabolic force is as small as the error of
-the model. The search for equilibria with a shallow model starts from the equilibrium with the exact cable.
+In the vertical plane of the cable the stiffness is a 2 x 2 matrix. Normal to the plane, the stiffness is T_x/x_B =
+tau/D, which is regular on a vertical chord. For the weightless and the exact cable, the force on the platform end is
+the gradient of an energy. The forces of the shallow models are not a gradient. The curl of the parabolic force is as
+small as the model's error. A search with a shallow model starts from the equilibrium with the exact cable.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels import codes
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import across_pulley, energy_over, stiffness_in_series
 from sagline.kernels.cable.models import sag_of_shallow, shallow_sag_force, slack_series, stretching_tension
 from sagline.kernels.cable.pulley import end_by
+from sagline.kernels.cable.swivel import stiffness_of_swivel
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness, PlaneVector, Pulley, material_at
 from sagline.kernels.jit import formula, kernel
 
@@ -29,10 +30,10 @@ def force_of(rows: Array, i: int) -> Force:
 
 
 @formula
-def series_excess(
+def _series_excess(
     horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float, weight_length: float
 ) -> float:
-    """Value of atanh(u)/u - 1 of P1. Infinite for a folded cable."""
+    """Value of atanh(u)/u - 1, where u is the argument of the series in P1. Infinite for a folded cable."""
     u = weight_length / (tension_a + tension_b)
     if u <= 0.5:
         return atanhc_excess(u)
@@ -43,7 +44,7 @@ def series_excess(
 def catenary_stiffness(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> PlaneStiffness:
-    """In-plane stiffness of the exact cable: the inverse of dB/dT of P1, without cancellation.
+    """In-plane stiffness of the exact cable: the inverse of dB/dT, in a form without cancellation.
 
     Let p, q and c be the coefficients of length/(T_A + T_B) in dx/dT_x, dz/dT_z and -dx/dT_z. Then p + q = 2 and p q =
     c^2 hold exactly, so that the determinant is a sum of positive terms.
@@ -53,10 +54,10 @@ def catenary_stiffness(
     tension_a = math.sqrt(square + vertical_a * vertical_a)
     tension_b = math.sqrt(square + vertical * vertical)
     product = tension_a * tension_b
-    excess = series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight * length)
+    excess = _series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight * length)
     stretch = 1.0 / stiffness
     turn = 1.0 / (tension_a + tension_b)
-    if product == 0.0:  # the force at one end is zero
+    if product == 0.0:  # the force at one end of the cable is zero
         return PlaneStiffness(0.0, 0.0, 0.0, 1.0 / (length * (stretch + turn)))
     c = horizontal * (vertical_a + vertical) / product
     level = (square - vertical_a * vertical) / product
@@ -93,7 +94,7 @@ def _elastic_stiffness(span: float, rise: float, length: float, tension: float, 
 
 
 @kernel
-def shallow_slopes(
+def _shallow_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> tuple[float, float, float, float, float]:
     """Derivatives of tau of a shallow cable with respect to x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1].
@@ -111,8 +112,8 @@ def shallow_slopes(
     square = tension * tension
     share = sag / square
     by_tension = length * (tension + sag_force * sine) / (stretch * stiffness) + 2.0 * chord * share / tension
-    # derivative of s with respect to the chord at fixed tau; the chord changes sin phi and the sag force (proportional
-    # to D)
+    # derivative of s with respect to the chord at fixed tau: sin phi changes, and the sag force, which is proportional
+    # to D
     by_sag_force = (sag_force + tension * sine) / stretch
     by_sine = tension * sag_force / stretch
     stretch_x = by_sag_force * sag_force * cosine / chord - by_sine * sine * cosine / chord
@@ -130,8 +131,8 @@ def shallow_slopes(
 def _shallow_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> PlaneStiffness:
-    """In-plane stiffness of a shallow cable. It is not symmetric, because the forces are not a gradient."""
-    by_x, by_z, _by_length, _by_density, _by_stiffness = shallow_slopes(model, span, rise, material, length, tension)
+    """In-plane stiffness of a shallow cable. The matrix is not symmetric, because the forces are not a gradient."""
+    by_x, by_z, _by_length, _by_density, _by_stiffness = _shallow_slopes(model, span, rise, material, length, tension)
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
     sine = rise / chord
@@ -170,8 +171,14 @@ def _free_span_at(rows: Array, i: int, behind: bool | None) -> tuple[float, floa
 
 @formula
 def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
-    """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`."""
+    """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`.
+
+    With swivel axes of any direction, the stiffness is filled in world axes.
+    """
     for i in range(cables.shape[0]):
+        if behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+            stiffness_of_swivel(model, cables, rows, i)
+            continue
         span, rise, length = _free_span_at(rows, i, behind)
         plane = cable_stiffness(model, span, rise, material_at(cables, i), length, force_of(rows, i))
         rows[g.ACROSS, i] = rows[g.TENSION, i] / rows[g.CHORD, i]
@@ -189,7 +196,7 @@ def plane_of(rows: Array, i: int) -> PlaneStiffness:
 
 @formula
 def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
-    """Energy V = T.B - C(T) [J] of strain and weight of the exact cable. The frame end has height 0."""
+    """Strain energy plus potential energy [J] of the exact cable, V = T.B - C(T). The frame end has height 0."""
     horizontal, vertical, _ = force
     weight_length = weight * length
     vertical_a = vertical - weight_length
@@ -199,7 +206,7 @@ def catenary_energy(span: float, rise: float, length: float, force: Force, weigh
     total = tension_a + tension_b
     half_mean = tension_a + vertical * (2.0 * vertical - weight_length) / total
     if horizontal != 0.0:
-        excess = series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight_length)
+        excess = _series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight_length)
         half_mean += 2.0 * square / total * (1.0 + excess)
     strain = square + vertical * (vertical - weight_length) + weight_length * weight_length / 3.0
     return horizontal * span + vertical * rise - 0.5 * length * (strain / stiffness + half_mean)
@@ -226,7 +233,7 @@ def _cable_energy(model: Model, span: float, rise: float, material: Material, le
 def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | None) -> tuple[float, float]:
     """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
 
-    `behind` is `Model.behind` as a separate argument. If it is None, the code for pulleys is not compiled.
+    `behind` is `Model.behind` as a separate argument. If `behind` is None, the code for pulleys is not compiled.
     """
     energy = 0.0
     size = 0.0
@@ -243,7 +250,7 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
 
 
 class _ForceSlopes(NamedTuple):
-    """Derivatives of the force on the platform end, with both ends fixed."""
+    """Derivatives of the force on the platform end with respect to cable parameters, with both ends fixed."""
 
     by_length: PlaneVector  # dT/dL [N/m]
     by_density: PlaneVector  # dT/d(rho) [N m/kg]
@@ -254,7 +261,7 @@ class _ForceSlopes(NamedTuple):
 
 @formula
 def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
-    """Change of the force if the platform end is fixed: minus the stiffness `plane` times the free motion `end`."""
+    """Change of the force on a fixed platform end: -`plane` (stiffness) times `end` (motion of a free end)."""
     return PlaneVector(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
 
 
@@ -303,7 +310,7 @@ def force_by_length(
         return force_change(plane, end)
     if force.tension == 0.0:
         return PlaneVector(0.0, 0.0)
-    along = -material.stiffness / (length * length)  # derivative of tau, divided by x and z of the chord
+    along = -material.stiffness / (length * length)  # derivative of tau, divided by the parts x and z of the chord
     return PlaneVector(along * span, along * rise)
 
 
@@ -312,7 +319,7 @@ def _shallow_force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> _ForceSlopes:
     """Derivatives of the force of a shallow cable with respect to L, rho and EA."""
-    _x, _z, by_length, by_density, by_stiffness = shallow_slopes(model, span, rise, material, length, tension)
+    _x, _z, by_length, by_density, by_stiffness = _shallow_slopes(model, span, rise, material, length, tension)
     chord = math.hypot(span, rise)
     cosine = span / chord
     sine = rise / chord
@@ -353,13 +360,13 @@ def slopes_over(
 ) -> _ForceSlopes:
     """Derivatives of the force of a cable over a pulley, for shallow and exact cables.
 
-    free: unstrained length of the free span [m].
+    `free`: unstrained length of the free span [m].
     """
     weight = 0.0 if model.code == codes.ELASTIC else material.density * model.gravity
     by_weight = none = PlaneVector(0.0, 0.0)
     if weight > 0.0:
         by_weight = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
-    if force.horizontal == 0.0 and force.vertical == weight * free:  # there is no force at P
+    if force.horizontal == 0.0 and force.vertical == weight * free:  # the force at the exit point P is zero
         return _ForceSlopes(none, none, none, none, none)
     heavier = model.gravity if weight > 0.0 else 0.0
     length = end_by(pulley, material, weight, force, free, (1.0, 0.0, 0.0, 0.0, 0.0), by_weight)

@@ -1,6 +1,6 @@
 """Data of one cable, and of all cables of one pose.
 
-The records of numbers cost no time in compiled code, because the compiler turns a NamedTuple into separate numbers.
+Records of numbers cost no time in compiled code, because the compiler replaces a NamedTuple by separate numbers.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Model(NamedTuple):
     k_h: float  # the empirical model's constant of the sag force
     k_p: float  # the empirical model's constant of the sag
     gravity: float  # [m/s^2]
-    # True if cables with given lengths may have pulleys or dead lengths; if None, the code for pulleys is not compiled
+    # True if cables may have pulleys or dead lengths; if None, the code for pulleys is not compiled
     behind: bool | None = None
 
 
@@ -86,7 +86,7 @@ class Cables(NamedTuple):
     """Data of the cables of one pose, with m values per field.
 
     The free span of a cable is the part between the exit point at its pulley and its platform end. If no cable has a
-    pulley or dead length, each free span is the whole cable, and its fields use the memory of the cable's fields.
+    pulley or dead length, each free span is the whole cable. Free spans and cables then share memory.
     """
 
     machine: bool  # True if any cable has a pulley or dead length

@@ -1,4 +1,4 @@
-"""Derivatives of the readings of one pose: direct effect of every unknown, and its effect through platform motion."""
+"""Derivatives of the readings of one pose with respect to every unknown: directly, and through platform motion."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Unknowns
+from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Unknowns, is_level
 from sagline.kernels.forward.platform import end_stiffness
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.statics import Triple, components_along, fill_motion_of_components, is_rotation
 
 
 class _FrameEndSlopes(NamedTuple):
-    """Frame-end tension and its derivatives. Except for `along` and `up`, the force on the platform end is constant."""
+    """Frame-end tension and its derivatives. All except `along` and `up` hold at a constant platform-end force."""
 
     tension: float  # T_A [N]
     along: float  # derivative with respect to the horizontal part of the platform-end force, in the cable's plane
@@ -34,8 +34,8 @@ class _FrameEndSlopes(NamedTuple):
 
 
 @formula
-def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
-    """Slopes of cable `i`, whose forces must be known. They are zero if the force at the frame end is zero."""
+def _frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
+    """Derivatives of the frame-end tension of cable `i`, from its forces, or zero if its frame-end tension is zero."""
     material = material_at(cables, i)
     gravity = model.gravity if model.code == codes.CATENARY else 0.0
     weight = material.density * gravity
@@ -75,7 +75,7 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
 
 @formula
 def in_world_axes(rows: Array, i: int, along: float, up: float) -> tuple[float, float, float]:
-    """Derivatives with respect to the force on the platform end, in world axes."""
+    """Derivatives with respect to the platform-end force, converted to world axes."""
     return along * rows[g.AZIMUTH_X, i], along * rows[g.AZIMUTH_Y, i], up
 
 
@@ -87,19 +87,19 @@ def cross(a: Triple, b: Triple) -> Triple:
 
 @formula
 def unit_vector(axis: int) -> Triple:
-    """Unit vector of an axis."""
+    """Unit vector along an axis."""
     return 1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0
 
 
 @formula
-def column_of(matrix: Array, k: int) -> Triple:
+def _column_of(matrix: Array, k: int) -> Triple:
     """Column `k` of a matrix (3, 3)."""
     return matrix[0, k], matrix[1, k], matrix[2, k]
 
 
 @formula
 def in_axes(axes: Array, vector: Triple) -> Triple:
-    """Components of a world vector along axes, which are the columns of a matrix (3, 3)."""
+    """Components of a world vector along the columns of `axes`, (3, 3)."""
     return (
         axes[0, 0] * vector[0] + axes[1, 0] * vector[1] + axes[2, 0] * vector[2],
         axes[0, 1] * vector[0] + axes[1, 1] * vector[1] + axes[2, 1] * vector[2],
@@ -109,7 +109,7 @@ def in_axes(axes: Array, vector: Triple) -> Triple:
 
 @formula
 def opposite(vector: Triple) -> Triple:
-    """The vector in the opposite direction."""
+    """The vector with opposite sign."""
     return -vector[0], -vector[1], -vector[2]
 
 
@@ -126,7 +126,7 @@ def scaled(factor: float, vector: Triple) -> Triple:
 
 
 @glue
-def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, motion: Array) -> None:
+def _fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, motion: Array) -> None:
     """Fill the `motion` of the platform due to `wrench` on the platform. The stiffness must be factored."""
     components_along(free, wrench, space.part)
     solve_lower(space.factor, space.part)
@@ -135,8 +135,8 @@ def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, 
 
 
 @formula
-def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple, direct: float) -> None:
-    """Fill the derivatives, with respect to the length of cable `i`, of the wrench on the platform and all readings."""
+def _fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple, direct: float) -> None:
+    """Fill the derivatives of the platform wrench and of all readings with respect to the length of cable `i`."""
     for k in range(3):
         space.by_wrench[i, k], space.by_wrench[i, 3 + k] = force[k], moment[k]
     for j in range(space.moved.shape[0]):
@@ -149,7 +149,7 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 @glue
 def add_motion(space: CalibrationArrays) -> None:
-    """Add changes of readings to the columns. Wrench changes move the platform, which changes the readings."""
+    """Add the change of readings due to platform motion. The wrench changes in the columns cause this motion."""
     for j in range(space.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]
@@ -159,12 +159,12 @@ def add_motion(space: CalibrationArrays) -> None:
 
 @glue
 def fill_motion(free: Array, space: CalibrationArrays, motion: Array) -> None:
-    """Fill the platform motions: one row per meter of each cable, and a last row per unit of the first unknown."""
+    """Fill the platform motions: row i per meter of cable i, and the last row per unit of the first unknown."""
     m = space.by_wrench.shape[0]
     for k in range(6):
         space.six[k] = space.wrench[k, 0]
     for i in range(m + 1):
-        fill_motion_by_wrench(free, space.by_wrench[i] if i < m else space.six, space, motion[i])
+        _fill_motion_by_wrench(free, space.by_wrench[i] if i < m else space.six, space, motion[i])
         for k in range(6):
             motion[i, k] = -motion[i, k]
 
@@ -194,7 +194,7 @@ def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
 
 @formula
 def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
-    """Change of the frame-end tension due to a horizontal motion of the platform end: K^T times the slopes."""
+    """Change of the frame-end tension per horizontal motion of the platform end: K^T times the derivatives by force."""
     x, y, z = shares[i, 0], shares[i, 1], shares[i, 2]
     return (
         ends[i, 0] * x + ends[i, 3] * y + ends[i, 6] * z,
@@ -225,7 +225,7 @@ def _add_wrench_change(space: CalibrationArrays, at: int, scale: float, force: T
 
 @formula
 def _add_force_change(space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float) -> None:
-    """Add to a column the effects of a change of one cable force, on the wrench and on the reading of this cable."""
+    """Add the effects of one cable force's change to a column: on the wrench, and on the reading of this cable."""
     _add_wrench_change(space, at, scale, force, cross(_lever_of(space.rows, i), force))
     space.work[i, at] += scale * direct
 
@@ -240,7 +240,7 @@ def _add_parameter_change(
     alone: float,
     space: CalibrationArrays,
 ) -> None:
-    """Add to a column the effects of a parameter of cable i, on its platform-end force and on its frame-end tension."""
+    """Add the effects of a parameter of cable `i` to a column: on its platform-end force and its frame-end tension."""
     at = sought.where[row, i]
     if at >= 0:
         change = _in_world_axes(space.rows, i, pair)
@@ -252,10 +252,10 @@ def _add_parameter_change(
 def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
     """Fill the platform-end stiffness of all cables and the derivatives of the frame-end tensions."""
     for i in range(cables.shape[0]):
-        across = end_stiffness(space.rows, i)
+        across = end_stiffness(cables, space.rows, i)
         for k in range(3):
             space.ends[i, k], space.ends[i, 3 + k], space.ends[i, 6 + k] = across[0][k], across[1][k], across[2][k]
-        slopes = frame_end_slopes(model, cables, space.rows, i)
+        slopes = _frame_end_slopes(model, cables, space.rows, i)
         x, y, z = in_world_axes(space.rows, i, slopes.along, slopes.up)
         space.shares[i, 0], space.shares[i, 1], space.shares[i, 2] = x, y, z
         space.shares[i, 3], space.shares[i, 4] = slopes.by_height, slopes.tension
@@ -263,7 +263,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 @glue
 def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
-    """Fill the change of every reading due to the motion under a unit wrench. The stiffness must be factored."""
+    """Fill the change of every reading per unit wrench, which moves the platform. The stiffness must be factored."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
@@ -271,14 +271,16 @@ def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple
             force = scaled(sensing.gain[j], own)
             moment = cross(_lever_of(space.rows, j), force)
         elif j < m + 3:
-            force = column_of(space.axes, j - m)
+            force = _column_of(space.axes, j - m)
             moment = cross(reach, force)
         else:
             force = (0.0, 0.0, 0.0)
-            moment = column_of(space.axes, j - m - 3)
+            moment = _column_of(space.axes, j - m - 3)
+            if is_level(sensing):
+                moment = unit_vector(j - m - 3)
         six[0], six[1], six[2] = force
         six[3], six[4], six[5] = moment
-        fill_motion_by_wrench(free, six, space, space.moved[j])
+        _fill_motion_by_wrench(free, six, space, space.moved[j])
 
 
 @glue
@@ -297,13 +299,13 @@ def fill_cable(
             _add_force_change(space, i, at, scale[kinds.FRAME + axis, i], change, direct)
         at = where[kinds.PLATFORM + axis, i]
         if at >= 0:
-            moved = column_of(space.rotation, axis)
+            moved = _column_of(space.rotation, axis)
             change = _force_by_motion(ends, i, moved)
             moment = plus(cross(moved, force), cross(lever, change))
             _add_wrench_change(space, at, scale[kinds.PLATFORM + axis, i], change, moment)
             direct = gain * (_tension_by_force(shares, i, change) + shares[i, 3] * moved[2])
             space.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
-    by = frame_end_slopes(model, cables, rows, i)
+    by = _frame_end_slopes(model, cables, rows, i)
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
     if model.behind is None:
@@ -317,9 +319,9 @@ def fill_cable(
     _add_parameter_change(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space)
     change = _in_world_axes(rows, i, own.by_length)
     direct = gain * (_tension_by_force(shares, i, change) + by.by_length)
-    fill_length(space, i, change, cross(lever, change), direct)
-    for k in range(3):
-        row = kinds.STIFFNESS if k == 2 else kinds.ZERO + k
+    _fill_length(space, i, change, cross(lever, change), direct)
+    for k in range(5):
+        row = kinds.ZERO + k if k < 2 else (kinds.STIFFNESS if k == 2 else kinds.SCALE + k - 3)
         at = where[row, i]
         if at >= 0:
             _add_force_change(space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
@@ -346,11 +348,11 @@ def _fill_center(
 ) -> None:
     """Add to the columns the effect of a shift of the center of mass, the reference point of platform motion.
 
-    Only the part that the free motions allow is added, because a planar platform stays in its plane.
+    Only the part of the shift along free motions is added, because a planar platform stays in its plane.
     """
     m = cables.shape[0]
     at, scale = sought.where[kinds.CENTER + axis, 0], sought.scale[kinds.CENTER + axis, 0]
-    back = opposite(_free_displacement(free, column_of(space.rotation, axis)))
+    back = opposite(_free_displacement(free, _column_of(space.rotation, axis)))
     for i in range(m):
         change = _force_by_motion(space.ends, i, back)
         moment = plus(cross(back, _force_at(space.rows, i)), cross(_lever_of(space.rows, i), change))
@@ -387,7 +389,7 @@ def fill_platform(
             continue
         unit = unit_vector(axis)
         shifted, around = in_axes(space.axes, unit), in_axes(space.axes, cross(from_system, unit))
-        outward = in_axes(space.axes, column_of(space.rotation, axis))
+        outward = in_axes(space.axes, _column_of(space.rotation, axis))
         for k in range(3):
             at = where[kinds.SHIFT + axis, 0]
             if at >= 0:
@@ -395,7 +397,8 @@ def fill_platform(
             at = where[kinds.TURN + axis, 0]
             if at >= 0:
                 space.work[m + k, at] += scale[kinds.TURN + axis, 0] * around[k]
-                space.work[m + 3 + k, at] -= scale[kinds.TURN + axis, 0] * shifted[k]
+                if not is_level(sensing):
+                    space.work[m + 3 + k, at] -= scale[kinds.TURN + axis, 0] * shifted[k]
             at = where[kinds.TARGET + axis, 0]
             if at >= 0:
                 space.work[m + k, at] += scale[kinds.TARGET + axis, 0] * outward[k]

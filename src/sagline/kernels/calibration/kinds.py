@@ -1,4 +1,4 @@
-"""Rows of the table of unknowns (KIND_ROWS, m). An entry is the index of a parameter's unknown, or -1 if known.
+"""Rows of the table of unknowns (KIND_ROWS, m): index of the unknown of each parameter, or -1 if it is known.
 
 Rows for the platform or the measuring system use only the column of the first cable.
 """
@@ -15,10 +15,12 @@ RADIUS = 10  # pulley radius [m]
 DEAD = 11  # dead length [m]
 GAIN = 12  # load cell gain
 BIAS = 13  # load cell bias [N]
-PER_CABLE = 14
+PER_CABLE = 14  # the rows before this one, and SCALE and CLOCK, have a value for each cable
 MASS = 14  # [kg]
 CENTER = 15  # center of mass, platform frame, three rows [m]
 SHIFT = 18  # position of the measuring system in the world, three rows [m]
 TURN = 21  # rotation vector of the measuring system in world axes, three rows [rad]
 TARGET = 24  # the measured point, platform frame, three rows [m]
-KIND_ROWS = 27
+SCALE = 27  # scale of the reported lengths of a cable
+CLOCK = 28  # time by which the reported length of a cable is late [s]
+KIND_ROWS = 29

@@ -1,7 +1,7 @@
 """Whitened residuals and derivatives of readings at equilibria, and initial lengths; docs/model.md, section 14.
 
-The true lengths at every pose are also unknown. They are eliminated pose by pose, because the errors of the measured
-lengths are treated as noise of the residual. The covariance of the residual is then diag(sigma^2) + sigma_L^2 A A^T.
+The true lengths are also unknown. These lengths are eliminated pose by pose: the errors of the measured lengths are
+treated as noise of the residual. The covariance of the residual is then diag(sigma^2) + sigma_L^2 A A^T.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def whiten(sensing: t.Sensing, residual: Array, space: t.CalibrationArrays) -> N
 
 
 @glue
-def store_linearization(
+def _store_linearization(
     sensing: t.Sensing,
     answer: t.Linearization,
     p: int,
@@ -90,10 +90,15 @@ def store_linearization(
 
 
 @formula
-def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Triple:
-    """Rotation vector from the predicted to the measured platform rotation, in the measuring system's axes."""
+def _rotation_between(reading_arrays: Array, pose: Array, frame: Array, level: bool) -> Triple:
+    """Rotation vector from the predicted to the measured platform rotation, in the measuring system's axes.
+
+    level: world axes, and the yaw of the reading is replaced by the yaw for which the vector is horizontal.
+    """
     # predicted rotation reading: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
+    if level:
+        fx, fy, fz, fw = 0.0, 0.0, 0.0, 1.0
     ax = fw * pose[3] + fx * pose[6] + fy * pose[5] - fz * pose[4]
     ay = fw * pose[4] + fy * pose[6] + fz * pose[3] - fx * pose[5]
     az = fw * pose[5] + fz * pose[6] + fx * pose[4] - fy * pose[3]
@@ -104,6 +109,11 @@ def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Tripl
     y = -rw * ay + ry * aw - rz * ax + rx * az
     z = -rw * az + rz * aw - rx * ay + ry * ax
     w = rw * aw + rx * ax + ry * ay + rz * az
+    if level:  # a rotation about the vertical in front of this rotation makes z zero
+        whole = math.sqrt(z * z + w * w)
+        if whole > 0.0:
+            x, y = (w * x + z * y) / whole, (w * y - z * x) / whole
+        z, w = 0.0, whole
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
     sine = math.sqrt(x * x + y * y + z * z)
@@ -121,13 +131,13 @@ def _fill_residual(
     space: t.CalibrationArrays,
     residual: Array,
 ) -> None:
-    """Fill readings minus predictions, and the standard deviations, which are infinite for missing readings."""
+    """Fill readings minus predictions, and the standard deviations. A missing reading has an infinite deviation."""
     m = residual.size - t.BESIDE
     for i in range(m):
         residual[i] = readings.cells[p, i] - (sensing.gain[i] * space.shares[i, 4] + sensing.bias[i])
         space.deviation[i] = sensing.tension_deviation[i]
     place = columns.in_axes(space.axes, from_system)
-    turn = _rotation_between(readings.rotations[p], pose, sensing.frame)
+    turn = _rotation_between(readings.rotations[p], pose, sensing.frame, t.is_level(sensing))
     for k in range(3):
         residual[m + k] = readings.positions[p, k] - place[k]
         residual[m + 3 + k] = turn[k]
@@ -200,11 +210,11 @@ def observe(
         columns.add_motion(space)
         _fill_residual(sensors, readings, p, pose, from_system, space, answer.residual[p])
         whiten(sensors, answer.residual[p], space)
-        store_linearization(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)
+        _store_linearization(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)
 
 
-ITERATIONS = 3  # iterations of balancing; a few are sufficient, because the sag forces depend weakly on the tensions
-LEAST = 0.2  # smallest ratio of a corrected tension to its measured value
+ITERATIONS = 3  # iterations of the force balance; few suffice, because the sag forces depend weakly on the tensions
+LEAST = 0.2  # smallest ratio of a corrected tension to the measured tension
 
 
 @entry
@@ -218,9 +228,9 @@ def starting_lengths(
     memory: tuple[Array, Indices],
     length_out: Array,
 ) -> None:
-    """Fill the unstrained lengths off the drums [m] of cables that balance the platform near the given tensions.
+    """Fill the unstrained lengths off the drums [m] of cables that balance the platform with tensions near `tension`.
 
-    The change of the chord tensions is the smallest change that balances the platform.
+    The chord tensions are changed as little as possible to balance the platform.
 
     Args:
         terms: Terms of the cable model.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.jit import glue
+from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block, vector
 
 BESIDE = 6  # readings of a pose without load cells: position and rotation in the axes of the measuring system
@@ -25,9 +26,17 @@ class Sensing(NamedTuple):
     tension_deviation: Array  # standard deviations of load cells [N], (m,); infinite without a load cell
     length_deviation: Array  # standard deviations of lengths [m], (m,)
     position_deviation: Array  # standard deviations of positions [m], (3,); infinite if not measured
-    rotation_deviation: Array  # standard deviations of rotations [rad], (3,); infinite if not measured
+    # Standard deviations of rotations [rad], (3,); infinite if not measured. If only the third value is infinite, the
+    # readings are roll and pitch, which refer to gravity and not to the measuring system.
+    rotation_deviation: Array
     frame: Array  # pose row of the measuring system in the world
     target: Array  # measured point, platform frame [m], (3,)
+
+
+@formula
+def is_level(sensing: Sensing) -> bool:
+    """True if the yaw is not measured, so that the axes of the rotations are those of the world."""
+    return math.isinf(sensing.rotation_deviation[2])
 
 
 class PoseReadings(NamedTuple):
@@ -43,8 +52,8 @@ class Unknowns(NamedTuple):
     """The P unknowns."""
 
     where: Indices  # index of the unknown for each row of `kinds`, (KIND_ROWS, m), -1 if known
-    scale: Array  # derivative of the parameter of each row with respect to its unknown, (KIND_ROWS, m)
-    paid: Array  # derivatives of the measured lengths with respect to zero, drum radius and EA, (3, N, m)
+    scale: Array  # derivative of each parameter with respect to its unknown, (KIND_ROWS, m)
+    paid: Array  # derivatives of the measured lengths by zero, drum radius, EA, scale and clock, (5, N, m)
 
 
 class Linearization(NamedTuple):
@@ -56,10 +65,10 @@ class Linearization(NamedTuple):
     matrix: Array  # whitened slopes, (N, R, P); rows without a reading are zero
     misfit: Array  # whitened residuals, (N, R)
     residual: Array  # readings minus predictions at the given lengths [N, m, rad], (N, m + 6); NaN if missing
-    back: Array  # change of the true lengths per whitened residual [m], (N, m, R)
+    back: Array  # change of the true lengths per unit of whitened residual [m], (N, m, R)
     # Motions of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows are motions
-    # per meter of each cable; the last row is the motion per unit of the first unknown. The shape is (0, m + 1, 6) if
-    # the caller does not need the motions.
+    # per meter of each cable; the last row is the motion per unit of the first unknown. A caller that does not need the
+    # motions passes the shape (0, m + 1, 6).
     motion: Array
     work: Array  # work array: slopes of the readings and of the wrench on the platform, (R + 6, P)
 
@@ -77,7 +86,7 @@ class CalibrationArrays(NamedTuple):
     six: Array  # (6,)
     moved: Array  # change of the readings per wrench on the platform, (R, 6)
     ends: Array  # stiffness of the platform ends, (m, 9)
-    shares: Array  # derivatives of frame-end tensions by platform-end force and height; then the tensions, (m, 5)
+    shares: Array  # derivatives of frame-end tensions by platform-end force and height, and the tensions, (m, 5)
     by_wrench: Array  # change of the wrench on the platform per length, (m, 6)
     by_length: Array  # change of the readings per length, A, (m, R)
     whole: Array  # covariance, then the inverse of its factor, (R, R)
@@ -89,7 +98,7 @@ class CalibrationArrays(NamedTuple):
 
 @glue
 def new_calibration_arrays(memory: Memory, m: int, n: int, work: Array) -> CalibrationArrays:
-    """Work arrays for `m` cables and `n` free motions; `work`: as in `Linearization`."""
+    """Work arrays for `m` cables and `n` free motions. `work`: as in `Linearization`."""
     readings = work.shape[0] - 6
     rows, memory = block(memory, CABLE_ROWS, m)
     rotation, memory = block(memory, 3, 3)

@@ -1,9 +1,9 @@
-"""A cable with mass as a chain of elements, which transmit only tension, between nodes, which are material points.
+"""A cable with mass as a chain: nodes are material points, and elements between them transmit only tension.
 
 docs/model.md, section 11. Node 0 is the platform end, and the last node is the frame end. Nodes are therefore added and
 removed at the end of the arrays. All elements have the same unstrained length, except the element at the frame, which
 has the remaining length. Each element adds half of its mass to each of its two nodes. Mass at node 0 is part of the
-platform.
+platform. A piece of a broken cable is also a chain: its node at the break is free and has the mass of half an element.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from sagline.kernels.jit import formula, kernel
 def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
     """Force [N] of the wind on a line; it is normal to the line.
 
-    wind: velocity of the air [m/s], (3,); along: its component along the line (x, y, z), divided by the line's length;
-    drag: force per square of the speed normal to the line [N s^2/m^2].
+    wind: velocity of the air [m/s], (3,); along: wind component along the line (x, y, z), divided by its length; drag:
+        force per square of the speed normal to the line [N s^2/m^2].
     """
     nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
     size = drag * math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -34,13 +34,15 @@ LOSS_TIME = 6  # [s]
 AIR_RATE = 7  # damping force of the air per velocity and mass of the cable [1/s]
 BEHIND, RUN = 8, 9  # cable between drum and exit point: unstrained length, and length of the path [m]
 WIND = 10  # force of the wind per length and square of the speed [N s^2/m^3]
-SMOOTH = 11  # weight of a new value in the filtered mean tension, by which a slack cable is detected
+SMOOTH = 11  # weight of a new value in the filtered mean tension, which detects a slack cable
 GRAVITY = 12  # [m/s^2]
-REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of cable paid out [m/s]
+REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of paying out [m/s]
 STEP = 15  # time step of the damping forces [s]
-CHAIN_COLUMNS = 16
+FREE_START, FREE_END = 16, 17  # 1 if the platform end or the frame end of the chain is free after a break, otherwise 0
+CABLE, FIRST, POINTS = 18, 19, 20  # index of the cable; first index and number of its recorded points
+CHAIN_COLUMNS = 21
 
-LEAST, MOST = 0.4, 1.6  # limits of the length of the element at the frame, relative to the other elements
+LEAST, MOST = 0.4, 1.6  # limits of the length of the element at the frame, relative to the length of the other elements
 TINY = 1e-300
 
 
@@ -49,7 +51,7 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
     """Fill the ratio force/length of every element [N/m]. Returns the power lost in the elements [W].
 
     place: positions of the nodes [m], (3, nodes), node 0 at the platform and node count + 1 at the frame; speed:
-    velocities of the nodes [m/s], used if the elements have damping; pulls: filled, followed by two work rows, (3
+    velocities of the nodes [m/s], used if the elements have damping; pulls: filled, followed by three work rows, (4
     nodes,).
     """
     element, stiffness = row[ELEMENT], row[STIFFNESS]
@@ -69,7 +71,7 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
 
 @formula
 def _strain_at_exit(row: Array, distance: float) -> float:
-    """Strain of the element at the frame, and of the freely sliding cable between this element and the drum."""
+    """Common strain of the element at the frame and of the freely sliding cable between this element and the drum."""
     return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
 
 
@@ -83,16 +85,15 @@ def _element_distance(place: Array, j: int) -> float:
 
 
 @formula
-def _element_direction(place: Array, j: int) -> tuple[float, float, float, float]:
-    """Unit vector from node `j` to the next node toward the frame, and the distance of both nodes [m]."""
+def _element_direction(place: Array, j: int, inverse: float) -> tuple[float, float, float, float]:
+    """Unit vector from node `j` to the next node toward the frame, and the distance of both nodes, 1/`inverse` [m]."""
     x, y, z = place[0, j + 1] - place[0, j], place[1, j + 1] - place[1, j], place[2, j + 1] - place[2, j]
-    distance = math.sqrt(x * x + y * y + z * z + TINY)
-    return x / distance, y / distance, z / distance, distance
+    return x * inverse, y * inverse, z * inverse, (x * x + y * y + z * z) * inverse
 
 
 @formula
 def _opening_speed(speed: Array, j: int, x: float, y: float, z: float) -> float:
-    """Speed [m/s] along the unit vector (x, y, z) of the next node toward the frame, relative to node `j`."""
+    """Speed [m/s] of the next node toward the frame, relative to node `j` and along the unit vector (x, y, z)."""
     vx, vy, vz = speed[0, j + 1] - speed[0, j], speed[1, j + 1] - speed[1, j], speed[2, j + 1] - speed[2, j]
     return x * vx + y * vy + z * vz
 
@@ -103,60 +104,68 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
 
     The forces follow from the speeds after the step (implicit Euler), so that damping does not limit the time step.
     Each force changes the speeds of the element's two nodes, so that the forces solve a tridiagonal system. The
-    platform and the frame node keep their speeds; elastic forces and weight also act on the other nodes. The power is
-    the power at the mean speed of the step.
+    platform and the frame node keep their speeds. Elastic forces and weight also act on the other nodes. The power
+    holds for the mean speed during the step.
     """
     size = place.shape[1]
-    viscous = row[STIFFNESS] * row[LOSS_TIME]
+    factors, values, inverses = pulls[size : 2 * size], pulls[2 * size : 3 * size], pulls[3 * size :]
+    inner_rate = row[ELEMENT] / (row[STIFFNESS] * row[LOSS_TIME])  # rate of stretch per force [m/(N s)]
+    last_rate = (row[REST] + row[BEHIND]) / (row[STIFFNESS] * row[LOSS_TIME])
+    start = 2.0 * row[FREE_START] * row[STEP] / (row[DENSITY] * row[ELEMENT])
+    end = 2.0 * row[FREE_END] * row[STEP] / (row[DENSITY] * row[REST])
     inner = row[STEP] / (row[DENSITY] * row[ELEMENT])
     last = row[STEP] / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
     fall = row[GRAVITY] * row[STEP]
+    for j in range(count + 1):
+        inverses[j] = 1.0 / (_element_distance(place, j) + TINY)
     # directions and elastic forces of the elements before, at and after j
     bx = by = bz = before = 0.0
     ax = ay = az = after = 0.0
-    x, y, z, distance = _element_direction(place, 0)
+    x, y, z, distance = _element_direction(place, 0, inverses[0])
     force = pulls[0] * distance
-    diagonal = 1.0
-    value = 0.0  # right side of the row before, after elimination
+    inverse = 1.0  # reciprocal of the diagonal of the row before, after elimination
+    value = 0.0  # right side of this row
     for j in range(count + 1):
-        near = 0.0 if j == 0 else (last if j == count else inner)
-        far = 0.0 if j == count else (last if j == count - 1 else inner)
+        near = start if j == 0 else (last if j == count else inner)
+        far = end if j == count else (last if j == count - 1 else inner)
         after = 0.0
         if j < count:
-            ax, ay, az, distance = _element_direction(place, j + 1)
+            ax, ay, az, distance = _element_direction(place, j + 1, inverses[j + 1])
             after = pulls[j + 1] * distance
         back, ahead = bx * x + by * y + bz * z, ax * x + ay * y + az * z
         opening = _opening_speed(speed, j, x, y, z)
         opening += far * (after * ahead - force) - near * (force - before * back)
-        if j == 0 or j == count:  # the weight acts on both nodes of the other elements
-            opening += fall * z if j == count else -fall * z
+        if j == 0 and start == 0.0:  # the weight acts on both nodes of the other elements
+            opening -= fall * z
+        elif j == count and end == 0.0:
+            opening += fall * z
         coupling = -near * back if force > 0.0 and before > 0.0 else 0.0
-        factor = coupling / diagonal
-        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
-        diagonal = length / viscous + near + far - coupling * factor
-        value = (opening - coupling * value) / diagonal if force > 0.0 else 0.0
-        pulls[size + j], pulls[2 * size + j] = factor, value
+        factor = coupling * inverse
+        inverse = 1.0 / ((last_rate if j == count else inner_rate) + near + far - coupling * factor)
+        value = (opening - coupling * value) * inverse if force > 0.0 else 0.0
+        factors[j], values[j] = factor, value
         bx, by, bz, before = x, y, z, force
         x, y, z, force = ax, ay, az, after
     power = 0.0
     force = 0.0
     for k in range(count + 1):
         j = count - k
-        factor = pulls[size + j + 1] if k > 0 else 0.0
-        force = pulls[2 * size + j] - factor * force
-        x, y, z, distance = _element_direction(place, j)
+        factor = factors[j + 1] if k > 0 else 0.0
+        force = values[j] - factor * force
+        x, y, z, distance = _element_direction(place, j, inverses[j])
         # the frame node has the velocity of the entering cable, which includes the change of the rest length
         opening = _opening_speed(speed, j, x, y, z)
-        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
         elastic = pulls[j]
-        pulls[j] = max(elastic + force / distance, 0.0) if elastic > 0.0 else 0.0
-        power += (pulls[j] - elastic) * distance * 0.5 * (opening + force * length / viscous)
+        pulls[j] = max(elastic + force * inverses[j], 0.0) if elastic > 0.0 else 0.0
+        power += (pulls[j] - elastic) * distance * 0.5 * (opening + force * (last_rate if j == count else inner_rate))
     return power
 
 
 @formula
 def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Fill the velocity of the frame node, which is L' (1 + strain) along the cable."""
+    """Fill the velocity of the frame node, which is L' (1 + strain) along the cable, unless the node is free."""
+    if row[FREE_END] > 0.0:
+        return
     for c in range(3):
         speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
 
@@ -176,14 +185,18 @@ def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array,
         back = pulls[count - 1] * (place[c, count] - place[c, count - 1])
         entering = 0.5 * row[DENSITY] * row[RATE] * speed[c, count + 1]
         speed[c, count] += last * (there - back + entering) - fall
+        if row[FREE_START] > 0.0:
+            speed[c, 0] += 2.0 * share * pulls[0] * (place[c, 1] - place[c, 0]) - fall
+        if row[FREE_END] > 0.0:
+            speed[c, count + 1] -= 2.0 * h / (row[DENSITY] * row[REST]) * there + fall
 
 
 @formula
 def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
     """Move the nodes for `h` [s]. The node next to the frame keeps its momentum while its mass changes.
 
-    place: positions of the nodes [m]; speed: their velocities [m/s]; before: unstrained length of the element at the
-    frame before the motion [m]; row: row of the cable, with this length after the motion; h: time [s].
+    `place`: positions of the nodes [m]. `speed`: their velocities [m/s]. `before`: unstrained length of the element at
+    the frame before the motion [m]. `row`: row of the cable, with this length after the motion. `h`: time [s].
     """
     old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
     middle = 0.5 * (old + new)
@@ -193,6 +206,22 @@ def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: floa
         momentum = speed[c, count] * old
         place[c, count] += h * momentum / middle
         speed[c, count] = momentum / new
+        if row[FREE_START] > 0.0:
+            place[c, 0] += h * speed[c, 0]
+        if row[FREE_END] > 0.0:
+            place[c, count + 1] += h * speed[c, count + 1]
+
+
+@formula
+def _first_node(row: Array) -> int:
+    """Index of the first node that the chain moves; node 0 moves with the platform, unless it is free."""
+    return 0 if row[FREE_START] > 0.0 else 1
+
+
+@formula
+def _last_node(count: int, row: Array) -> int:
+    """Index of the last node that the chain moves; node count + 1 is at the frame, unless it is free."""
+    return count + 1 if row[FREE_END] > 0.0 else count
 
 
 @kernel
@@ -203,7 +232,7 @@ def slow_by_air(speed: Array, count: int, row: Array, h: float) -> float:
     factor = math.exp(-row[AIR_RATE] * h)
     before = kinetic(speed, count, row)
     for c in range(3):
-        for j in range(1, count + 1):
+        for j in range(_first_node(row), _last_node(count, row) + 1):
             speed[c, j] *= factor
     return (1.0 - factor * factor) * before
 
@@ -213,11 +242,14 @@ def kinetic(speed: Array, count: int, row: Array) -> float:
     """Kinetic energy of the free nodes [J]."""
     inner = 0.0
     last = 0.0
+    ends = 0.0
     for c in range(3):
         for j in range(1, count):
             inner += speed[c, j] * speed[c, j]
         last += speed[c, count] * speed[c, count]
-    return 0.5 * row[DENSITY] * (row[ELEMENT] * inner + 0.5 * (row[ELEMENT] + row[REST]) * last)
+        ends += row[FREE_START] * row[ELEMENT] * speed[c, 0] * speed[c, 0]
+        ends += row[FREE_END] * row[REST] * speed[c, count + 1] * speed[c, count + 1]
+    return 0.5 * row[DENSITY] * (row[ELEMENT] * inner + 0.5 * (row[ELEMENT] + row[REST]) * last + 0.5 * ends)
 
 
 @kernel
@@ -242,12 +274,14 @@ def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
     more = max(_strain_at_exit(row, _element_distance(place, count)), 0.0) * last
     strain = 0.5 * stiffness * (stretch / element + more * more / last)
     above = element * height + 0.5 * (element + row[REST]) * (place[2, count] - row[EXIT_Z])
+    above += 0.5 * row[FREE_START] * element * (place[2, 0] - row[EXIT_Z])
+    above += 0.5 * row[FREE_END] * row[REST] * (place[2, count + 1] - row[EXIT_Z])
     return strain, row[DENSITY] * row[GRAVITY] * above
 
 
 @kernel
 def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Energy per length paid out [N] that the winch loses: H = T + T^2/(2 EA) - w z minus kinetic energy per length.
+    """Energy per length paid out [N] that the chain loses: H = T + T^2/(2 EA) - w z minus kinetic energy per length.
 
     While cable is paid out, the sum of `kinetic` and `potential` changes at the rate -H times the rate of the length.
     """
@@ -287,10 +321,10 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 
 @kernel
 def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Insert a node in the element at the frame, one element length from its free end. Updates count and rest.
+    """Insert a node in the element at the frame, one element length from its free end. The caller updates the counts.
 
-    Tension, mass and momentum, including the half element at the frame, do not change. If there is no cable between
-    exit point and drum, position and velocity are linear along the element, and the center of mass does not change.
+    Tension, mass and momentum, including the half element at the frame, do not change. Without cable between exit point
+    and drum, position and velocity are linear along the element, and the center of mass does not change.
     """
     rest, rate = row[REST], row[RATE]
     distance, left = _element_distance(place, count), rest - row[ELEMENT]
@@ -307,7 +341,7 @@ def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
 
 @kernel
 def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Merge the element at the frame with its neighbor, and remove the node between both. Updates count and rest.
+    """Merge the element at the frame with its neighbor and remove the node between both. The caller updates the counts.
 
     The next node takes the momentum of the removed node. The half element at the frame moves with the entering cable,
     so that its momentum is subtracted.
@@ -335,9 +369,11 @@ def wind_on_element(place: Array, j: int, k: int, drag: float, wind: Array) -> t
 def add_wind_on_nodes(place: Array, speed: Array, count: int, row: Array, wind: Array, h: float) -> float:
     """Update the nodes' velocities by the wind across the cable, during `h` [s]. Returns the work of the wind [J]."""
     work = 0.0
-    for j in range(1, count + 1):
-        length = row[ELEMENT] if j < count else 0.5 * (row[ELEMENT] + row[REST])
-        x, y, z = wind_on_element(place, j - 1, j + 1, length * row[WIND], wind)
+    for j in range(_first_node(row), _last_node(count, row) + 1):
+        below = row[ELEMENT] if j <= count else row[REST]
+        above = row[ELEMENT] if j < count else row[REST]
+        length = 0.5 * ((below if j > 0 else 0.0) + (above if j <= count else 0.0))
+        x, y, z = wind_on_element(place, max(j - 1, 0), min(j + 1, count + 1), length * row[WIND], wind)
         share = h / (row[DENSITY] * length)
         along = x * (speed[0, j] + 0.5 * share * x) + y * (speed[1, j] + 0.5 * share * y)
         work += h * (along + z * (speed[2, j] + 0.5 * share * z))

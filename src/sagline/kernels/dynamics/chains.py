@@ -1,7 +1,7 @@
 """Motion of the platform on cables with mass, modeled as chains; the forces are evaluated once per step.
 
-The integrator is the symplectic splitting of `sagline.kernels.dynamics.motion`. Its kicks and drifts also move the
-nodes of the chains. Winches, time tables and audit are as in that module. docs/model.md, section 11.
+The integrator is the symplectic splitting of `sagline.kernels.dynamics.motion`. Kicks and drifts also move the nodes of
+the chains. Winches, time tables and energy audit are the same as in `motion`. docs/model.md, section 11.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, l
 
 
 class _Chains(NamedTuple):
-    """The chains of m cables, with memory for P nodes each."""
+    """The chains of m cables or pieces of broken cables, with memory for P nodes each."""
 
     table: Array  # parameters of the chains, (m, CHAIN_COLUMNS)
     place: Array  # positions of the nodes [m], (m, 3, P)
     speed: Array  # velocities of the nodes [m/s], (m, 3, P)
-    pulls: Array  # element forces divided by element lengths [N/m], and work, (m, 3 P)
+    pulls: Array  # element forces divided by element lengths [N/m], and work, (m, 4 P)
     counts: Indices  # numbers of free nodes, (m,)
 
 
@@ -91,6 +91,8 @@ def _fill_last_elements(run: ChainRun) -> None:
     """Fill the remaining length of the element at the frame, and its rate, for every cable."""
     for i in range(run.chains.counts.shape[0]):
         row = run.chains.table[i]
+        if row[c.FREE_END] > 0.0:
+            continue
         row[c.REST] = run.rows[g.LENGTH, i] - row[c.BEHIND] - run.chains.counts[i] * row[c.ELEMENT]
         row[c.RATE] = run.drives.now[d.RATE, i]
 
@@ -110,10 +112,25 @@ def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
     _fill_last_elements(run)
 
 
+@glue
+def _fill_frame_tensions(run: ChainRun, i: int) -> None:
+    """Fill the tensions of chain `i` at its frame end; they are zero if this end is free."""
+    chains, now, n, row = run.chains, run.drives.now, run.chains.counts[i], run.chains.table[i]
+    tension, whole, lifted = 0.0, 0.0, 0.0
+    if row[c.FREE_END] == 0.0:
+        tension = c.tension_at_exit(chains.place[i], n, row, chains.pulls[i])
+        whole = c.whole_force(chains.place[i], chains.speed[i], n, row, chains.pulls[i])
+        lifted = row[c.DENSITY] * run.gravity * run.drives.data[d.BEHIND_RISE, i]
+    now[d.AT_FRAME, i], now[d.WHOLE, i] = tension, whole
+    now[d.AT_DRUM, i] = d.tension_at_drum(whole, lifted, row[c.STIFFNESS])
+    mean, share = c.mean_tension(chains.pulls[i], n, row), row[c.SMOOTH] if run.at[progress.READY] == 2 else 1.0
+    run.rows[g.TENSION, i] = share * mean + (1.0 - share) * (run.rows[g.TENSION, i] if share < 1.0 else 0.0)
+
+
 @kernel
 def fill_platform_force(run: ChainRun) -> float:
     """Fill the force on the platform and the tensions at the winches. Returns the power lost [W]."""
-    chains, drives, state, rows = run.chains, run.drives, run.state, run.rows
+    chains, state = run.chains, run.state
     ends = run.cables[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
     center, velocity = state[rigid_body.CENTER :], state[rigid_body.VELOCITY :]
     lost = 0.0
@@ -125,12 +142,16 @@ def fill_platform_force(run: ChainRun) -> float:
     for i in range(chains.counts.shape[0]):
         n, row, place, speed = chains.counts[i], chains.table[i], chains.place[i], chains.speed[i]
         x, y, z = turned(state, ends[i, 0], ends[i, 1], ends[i, 2])
-        place[0, 0], place[1, 0], place[2, 0] = center[0] + x, center[1] + y, center[2] + z
-        speed[0, 0] = velocity[0] + (wy * z - wz * y)
-        speed[1, 0] = velocity[1] + (wz * x - wx * z)
-        speed[2, 0] = velocity[2] + (wx * y - wy * x)
+        if row[c.FREE_START] == 0.0:
+            place[0, 0], place[1, 0], place[2, 0] = center[0] + x, center[1] + y, center[2] + z
+            speed[0, 0] = velocity[0] + (wy * z - wz * y)
+            speed[1, 0] = velocity[1] + (wz * x - wx * z)
+            speed[2, 0] = velocity[2] + (wx * y - wy * x)
         c.fill_frame_node_velocity(place, speed, n, row)
         lost += c.fill_element_forces(place, speed, n, row, chains.pulls[i])
+        _fill_frame_tensions(run, i)
+        if row[c.FREE_START] > 0.0:
+            continue
         air = 0.5 * row[c.DENSITY] * row[c.ELEMENT] * row[c.AIR_RATE]
         px = chains.pulls[i, 0] * (place[0, 1] - place[0, 0]) - air * speed[0, 0]
         py = chains.pulls[i, 0] * (place[1, 1] - place[1, 0]) - air * speed[1, 0]
@@ -142,13 +163,6 @@ def fill_platform_force(run: ChainRun) -> float:
             lost -= bx * speed[0, 0] + by * speed[1, 0] + bz * speed[2, 0]
         fx, fy, fz = fx + px, fy + py, fz + pz
         mx, my, mz = mx + (y * pz - z * py), my + (z * px - x * pz), mz + (x * py - y * px)
-        tension = c.tension_at_exit(place, n, row, chains.pulls[i])
-        whole = c.whole_force(place, speed, n, row, chains.pulls[i])
-        lifted = row[c.DENSITY] * run.gravity * drives.data[d.BEHIND_RISE, i]
-        drives.now[d.AT_FRAME, i], drives.now[d.WHOLE, i] = tension, whole
-        drives.now[d.AT_DRUM, i] = d.tension_at_drum(whole, lifted, row[c.STIFFNESS])
-        mean, share = c.mean_tension(chains.pulls[i], n, row), row[c.SMOOTH] if run.at[progress.READY] == 2 else 1.0
-        rows[g.TENSION, i] = share * mean + (1.0 - share) * (rows[g.TENSION, i] if share < 1.0 else 0.0)
     for k in range(6):
         free = run.free[k]
         run.force[k] = free[0] * fx + free[1] * fy + free[2] * fz + free[3] * mx + free[4] * my + free[5] * mz
@@ -183,10 +197,11 @@ def kick_chains(run: ChainRun, h: float, begins: bool) -> None:
             c.kick_nodes(place, speed, n, row, chains.pulls[i], h)
 
 
-ENDED = progress.COUNTERS  # additional counter of cables with mass; FAILED: index of the cable that ended the run
+ENDED = progress.COUNTERS  # additional counter for cables with mass: index of the cable that ended the run
 DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # smallest number of free nodes of a chain
-# largest energy error, relative to the energy that can become motion; phase errors cause smaller energy errors
+# largest energy error, relative to the energy that can be converted to motion; errors of the phase alone cause smaller
+# energy errors
 GROWTH = 0.5
 
 
@@ -201,7 +216,7 @@ def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
 
 @kernel
 def change_node_count(run: ChainRun, i: int) -> None:
-    """Add or remove one node of chain `i` at the frame, and add the energy change to the audit."""
+    """Add or remove one node of chain `i` at the frame, and add the change of energy to the energy audit."""
     chains, audit = run.chains, run.drives.audit
     row, place, speed, n = chains.table[i], chains.place[i], chains.speed[i], chains.counts[i]
     more = 1 if row[c.REST] > row[c.ELEMENT] else -1
@@ -224,16 +239,16 @@ def change_node_count(run: ChainRun, i: int) -> None:
 
 @kernel
 def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
-    """Fill points (points, 3) of a chain at equal material steps, starting at the exit point."""
-    element, rest = row[c.ELEMENT], row[c.REST]
+    """Fill the points of a chain in `points` (points, 3) of its cable, at equal steps, starting at the frame end."""
+    element, rest, first, number = row[c.ELEMENT], row[c.REST], int(row[c.FIRST]), int(row[c.POINTS])
     length = rest + count * element
-    for p in range(points.shape[0]):
-        way = length * p / (points.shape[0] - 1) - rest  # length from the node next to the frame
+    for p in range(number):
+        way = length * p / (number - 1) - rest  # length from the node next to the frame
         passed = int(min(max(way / element, 0.0), count - 1.0)) if way > 0.0 else -1
         share = way / element - passed if way > 0.0 else 1.0 + way / rest
         for k in range(3):
             start = place[k, count - passed]
-            points[p, k] = start + share * (place[k, count - passed - 1] - start)
+            points[first + p, k] = start + share * (place[k, count - passed - 1] - start)
 
 
 @kernel
@@ -250,7 +265,9 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
         stretched, height = c.potential(chains.place[i], n, row)
         swinging = c.kinetic(chains.speed[i], n, row)
         kinetic, strain, size = kinetic + swinging, strain + stretched, size + abs(height)
-        raised += height - 0.5 * row[c.DENSITY] * row[c.ELEMENT] * run.gravity * row[c.EXIT_Z]
+        raised += height
+        if row[c.FREE_START] == 0.0:
+            raised -= 0.5 * row[c.DENSITY] * row[c.ELEMENT] * run.gravity * row[c.EXIT_Z]
         if not swinging <= wildest:
             wildest, blamed = swinging, i
         if drives.kind == d.DRUMS:
@@ -275,13 +292,13 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
         energies[r, progress.SUPPLIED], energies[r, progress.LOST] = audit[d.SUPPLIED], audit[d.LOST]
         for i in range(chains.counts.shape[0]):
             tensions[r, i], lengths[r, i] = drives.now[d.AT_FRAME, i], run.rows[g.LENGTH, i]
-            _sample_points(chains.place[i], chains.counts[i], chains.table[i], points[r, i])
+            _sample_points(chains.place[i], chains.counts[i], chains.table[i], points[r, int(chains.table[i, c.CABLE])])
         at[progress.RECORDS] += 1
 
 
 @glue
 def _split_step(run: ChainRun, now: float) -> None:
-    """One step that starts at `now`. The stored forces belong to the state before the step, then to the new state."""
+    """Take one step from the time `now`. The stored forces belong to the start of the step, afterwards to its end."""
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
     drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
     rigid_body.kick_body(run.state, run.inertia, run.force, half)
@@ -294,7 +311,8 @@ def _split_step(run: ChainRun, now: float) -> None:
     follow_time_tables(run, now + h, -progress.MOMENT * h)
     for i in range(rows.shape[1]):
         row = chains.table[i]
-        before = row[c.REST] + (drives.now[d.BEFORE, i] - rows[g.LENGTH, i])
+        paid_out = 0.0 if row[c.FREE_END] > 0.0 else rows[g.LENGTH, i] - drives.now[d.BEFORE, i]
+        before = row[c.REST] - paid_out
         c.drift_nodes(chains.place[i], chains.speed[i], chains.counts[i], row, before, h)
     drives.audit[d.LOST] += h * fill_platform_force(run)
     d.add_winch_energy(drives, run.cables, rows, h)
@@ -309,7 +327,7 @@ def _change_node_counts(run: ChainRun) -> None:
     """Add or remove a node of each chain whose element at the frame is too long or too short."""
     for i in range(run.chains.counts.shape[0]):
         rest, element = run.chains.table[i, c.REST], run.chains.table[i, c.ELEMENT]
-        if not c.LEAST * element < rest < c.MOST * element:
+        if run.chains.table[i, c.FREE_END] == 0.0 and not c.LEAST * element < rest < c.MOST * element:
             change_node_count(run, i)
 
 
@@ -337,12 +355,12 @@ def run_chains(
             point of the given wrench in these axes, (3,).
         data: Data of the drives, (DATA_ROWS, m).
         courses: Time tables of lengths, wrenches and wind velocity; see `motion.run_massless`.
-        kept: Same as in `motion.run_massless`, but with one more counter. The length of the work array is ROOM plus two
-            times the number of columns of the table of lengths.
+        kept: Same as in `motion.run_massless`, but with one more counter. The work array has ROOM entries plus two
+            entries per column of the table of lengths.
         chain_arrays: `Chains`, with the state before the steps; overwritten with the state after them.
-        stock: Initial energies that can become motion, (2,); NaN before the first call, which fills them.
+        stock: Initial energies that can be converted to motion, (2,). NaN before the first call.
         records: Filled as in `motion.run_massless`; also filled with points of the cables (R, m, points, 3) at equal
-            material steps, starting at the exit point.
+            material steps, starting at the frame end. Points between the pieces of a broken cable are not filled.
         steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the present state is
             recorded.
         every: Number of steps between records; the first record is the initial state.
@@ -363,7 +381,7 @@ def run_chains(
     for _ in range(steps):
         time = audit[d.BEGIN] + at[progress.STEPS] * step
         if progress.interval_ends(run.lengths, at[progress.LENGTH_AT], time + progress.MOMENT * step):
-            follow_time_tables(run, time, progress.MOMENT * step)  # rates may jump here
+            follow_time_tables(run, time, progress.MOMENT * step)  # the rates may jump at this instant
             fill_platform_force(run)
         if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
             d.close_loops(drives, run.targets, run.target_rates, stride * step)

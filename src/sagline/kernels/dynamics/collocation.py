@@ -149,15 +149,15 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
                 phi[d + b, column] -= size * mu * WEIGHTS[k] * system[k * d + b, n + column]
 
 
-# columns of a wave: omega; omega^2; i omega c; factors of C for transverse and longitudinal waves
+# columns of a wave's table: omega; omega^2; i omega c; factors of C for transverse and longitudinal waves
 OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
 ROOM = (5 * STAGES, 20)  # shape of the work array
-# largest number of meshes, which are tried one by one if a joint is near a vibration node of the cable up to this joint
+# largest number of meshes; the next mesh is tried if a joint is near a vibration node of the cable up to this joint
 MESHES = 8
 SHORTER = 0.0618034  # relative decrease of the element length from mesh to mesh; not a ratio of small integers
-ROUNDING = 2.0**-52  # growth of mu from mesh to mesh, because omega may be exactly a held frequency
-CLEAR = 1e-6  # smallest motion of a joint, relative to its static motion, with sufficient accuracy
+ROUNDING = 2.0**-52  # increase of mu from mesh to mesh, because omega may be exactly a frequency of a fixed cable
+CLEAR = 1e-6  # least motion of a joint, relative to its static motion; a smaller motion is not accurate
 # columns of a cable's result: in its plane, and normal to it
 XX, XZ, ZZ, YY = 0, 1, 2, 3
 FOUND = 4
@@ -167,7 +167,7 @@ SINGULAR, TOO_MANY = -1, -2  # returned instead of a count
 
 @glue
 def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
-    """Fill end displacements and forces of an element, (d, d), for unit displacements u and f = k u at its start."""
+    """Fill `moved`: displacements and forces at an element's end. The start has unit displacements u and forces k u."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, b], phi[d + a, b]
@@ -180,7 +180,7 @@ def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> Non
 
 @glue
 def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
-    """`_transfer_stiffness` of the first element, whose start has the compliance give * lost, (d, d); 0 if fixed."""
+    """`_transfer_stiffness` of the first element, which has a start with the compliance `give` * `lost`, (d, d)."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, d + b], phi[d + a, d + b]
@@ -209,8 +209,8 @@ def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
 def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
     """Number of negative eigenvalues of the pivot, the symmetric Phi_uf^-1 `moved`. SINGULAR if almost singular.
 
-    At zero frequency, the determinant of the matrix `moved` is at least one. It is zero if the joint is at a vibration
-    node of the cable between frame end and joint.
+    At zero frequency, the determinant of the matrix `moved` is at least one. The determinant is zero if the joint is at
+    a vibration node of the cable between frame end and joint.
     """
     if d == 1:
         pivot = moved[0, 0].real * phi[0, 1].real
@@ -228,7 +228,7 @@ def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
 
 @glue
 def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
-    """Number of negative eigenvalues of the pivot 1/give + k00, for a start that is flexible in one direction."""
+    """Number of negative eigenvalues of the pivot 1/`give` + k00. The cable's start is flexible in one direction."""
     if d == 1:
         return int(1.0 + (give[0, 0] * phi[0, 0] / phi[0, 1]).real < 0.0)
     determinant = phi[0, 2] * phi[1, 3] - phi[0, 3] * phi[1, 2]
@@ -244,10 +244,10 @@ def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
 def _cable_stiffness_at(
     string: String, wave: Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
 ) -> int:
-    """Fill K(omega) - K(0) of a cable's platform end, (d, d). Returns the number of held frequencies below `omega`.
+    """Fill K(omega) - K(0) of a cable's platform end, (d, d). Returns the number of natural frequencies below `omega`.
 
-    A held frequency is a natural frequency of the cable with a fixed platform end. The result is SINGULAR if a joint is
-    close to a vibration node, and TOO_MANY if the number of elements is too large.
+    The natural frequencies are those of the cable with a fixed platform end. The result is SINGULAR if a joint is close
+    to a vibration node, and TOO_MANY if the number of elements is too large.
     """
     c, system, phi = room[2 * STAGES : 3 * STAGES], room[: 2 * STAGES], room[3 * STAGES : 3 * STAGES + 4]
     rest, k = room[3 * STAGES + 4 :, :2], room[3 * STAGES + 4 :, 2:4]
@@ -296,7 +296,7 @@ def _cable_stiffness_at(
 def dynamic_stiffnesses(
     strings: Array, waves: Numbers, phase: float, room: Numbers, found: Numbers, counts: Indices
 ) -> None:
-    """Dynamic part of the stiffness of m strings at N poses.
+    """Dynamic part K(omega) - K(0) of the stiffness of m strings at N poses.
 
     Args:
         strings: (N, m, STRING_COLUMNS).
@@ -304,8 +304,8 @@ def dynamic_stiffnesses(
         phase: Phase of a transverse wave in an element [rad], < pi.
         room: Work array of shape ROOM.
         found: Filled with K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN for a cable without force.
-        counts: Filled with the numbers of held frequencies below omega, in the plane and normal to it, (N, F, m, 2);
-            negative if the cable has too many elements.
+        counts: Filled with the numbers of natural frequencies below omega, platform end fixed, in the plane and normal
+            to it, (N, F, m, 2); negative if the cable has too many elements.
     """
     give, block = room[4 * STAGES : 4 * STAGES + 2, :2], room[4 * STAGES : 4 * STAGES + 2, 2:4]
     for p in range(strings.shape[0]):

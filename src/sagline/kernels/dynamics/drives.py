@@ -1,4 +1,4 @@
-"""Drives of winches: ideal, of second order, or a drum with motor, control loops and friction; cable on the drum.
+"""Drives of winches (ideal, second-order, or drum with motor, control loops and friction), and cable on the drum.
 
 Lengths s are measured along the path of winding, and increase while cable is paid out; docs/model.md, sections 10 and
 11.
@@ -19,12 +19,12 @@ BIN = 0.005  # length of a bin [m]: a piece of the cable on the drum that has a 
 
 @kernel
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
-    """Wind cable onto a drum. Returns the energy [J] that is lost because a bin has a single strain.
+    """Wind cable onto a drum. Returns the energy [J] lost by averaging the strain in each bin of cable.
 
     The strained and the unstrained length of the cable in a bin do not change when its strain is averaged.
 
-    layer: strain in each bin of the cable on the drum, (B,); the last bin has no end; place: length paid out before
-    this step [m]; step: length to wind in [m], > 0; stiffness: EA [N].
+    `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out before
+    this step [m]. `step`: length to wind in [m], > 0. `stiffness`: EA [N].
     """
     lost = 0.0
     first, last = _bin_of(layer, place - step), _bin_of(layer, place)
@@ -46,8 +46,8 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
 def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
     """Mean strain of the cable that a drum pays out, and the energy [J] that is lost by averaging.
 
-    layer: strain in each bin of the cable on the drum, (B,); the last bin has no end; place: length paid out before
-    this step [m]; step: length to pay out [m], > 0; stiffness: EA [N].
+    `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out before
+    this step [m]. `step`: length to pay out [m], > 0. `stiffness`: EA [N].
     """
     first, last = _bin_of(layer, place), _bin_of(layer, place + step)
     if first == last:
@@ -71,7 +71,8 @@ def _bin_of(layer: Array, place: float) -> int:
 # kinds of winches
 IDEAL, SECOND_ORDER, DRUMS = 0, 1, 2
 
-NO, YES, NEW = 0.0, 1.0, 2.0
+NO, YES, NEW = 0.0, 1.0, 4.0  # NEW is added to a state that is not recorded yet
+TORQUE, SPEED_BOUND = 1.0, 2.0  # states of a drive at its limits; their sum if it is at both limits
 
 # rows of the state of the drives of m cables, (DRIVE_ROWS, m)
 RATE = 0  # dL/dt of the unstrained length [m/s]
@@ -82,7 +83,7 @@ AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # frame-end tension including damping; H and
 STRETCHING = 8  # damping part of H [N]
 FILTERED = 9  # frame-end tension after the load cell's filter [N]
 PEAK = 10  # largest tension at the frame end [N]
-HELD, SATURATED, SLACK = 11, 12, 13  # NO, YES, or NEW for an event that is not recorded yet
+HELD, SATURATED, SLACK = 11, 12, 13  # NO or YES; SATURATED contains the limits; the last two rows also contain NEW
 STORED = 14  # strain of the cable that enters or leaves the drum
 BEFORE, BEFORE_WHOLE, BEFORE_DRUM = 15, 16, 17  # L, H and tension at the drum one step before
 PULL = 18  # frame-end tension without damping [N]; cables without mass only
@@ -102,7 +103,7 @@ DATA_ROWS = 12
 # sums over a run [J]
 SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
 START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start and its potential part [J]; time of step 0 [s]
-MOVED = 8  # largest sum so far of kinetic energy, change of potential energy, supplied and lost energy
+MOVED = 8  # largest value so far of the sum of kinetic energy, change of potential energy, supplied and lost energy
 AUDIT_SIZE = 9
 
 LOOP_PERIOD = 1e-3  # [s]
@@ -121,7 +122,7 @@ class Drives(NamedTuple):
 
 @formula
 def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Update the rates of second-order winches, at a step's start explicitly, at its end by the adjoint method."""
+    """Update the rates of second-order winches: explicitly at a step's start (`begins`), by the adjoint at its end."""
     for i in range(rows.shape[1]):
         omega, ratio = drives.data[BANDWIDTH, i], drives.data[RATIO, i]
         push = omega * omega * (targets[i] - rows[g.LENGTH, i])
@@ -186,7 +187,7 @@ def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time:
 
 @formula
 def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
-    """Add to the audit the strain change of the cable that leaves its drum. The RATE of the step must be known."""
+    """Add the energy of the strain change of cable that leaves its drum to the audit. Row RATE must be filled."""
     for i in range(cables.shape[0]):
         stiffness = cables[i, tables.STIFFNESS]
         wound = stiffness * drives.now[STORED, i]
@@ -199,7 +200,7 @@ def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
 def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> None:
     """Fill the motor forces from lengths and speeds: P-PI control with anti-windup.
 
-    targets: set points of s (m,), then the expected tensions at the drums (m,).
+    `targets`: set points of s (m,), then the expected tensions at the drums (m,).
     """
     m = drives.now.shape[1]
     for i in range(m):
@@ -212,20 +213,23 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
         if force == asked or (asked > limit and error < 0.0) or (asked < -limit and error > 0.0):
             drives.now[INTEGRAL, i] += period * drives.data[INTEGRAL_GAIN, i] * error
         drives.now[FORCE, i] = force
-        full = (force != asked or speed != wanted) and not drives.now[HELD, i] > 0.0
-        drives.now[SATURATED, i] = (NEW if drives.now[SATURATED, i] == NO else YES) if full else NO
+        known, reached = drives.now[SATURATED, i] % NEW, NO
+        if not drives.now[HELD, i] > 0.0:
+            reached = (TORQUE if force != asked else 0.0) + (SPEED_BOUND if speed != wanted else 0.0)
+        joined = (force != asked and known % SPEED_BOUND == NO) or (speed != wanted and known < SPEED_BOUND)
+        drives.now[SATURATED, i] = reached + (NEW if joined and reached > NO else NO)
 
 
 @formula
 def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
-    """Tension at the drum [N]; `whole`: H at the frame end; `lifted`: weight of cable between drum and frame end."""
+    """Tension at the drum [N]. `whole`: H at the frame end. `lifted`: weight of cable between drum and frame end."""
     fallen = whole - lifted
     return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
 
 
 @glue
 def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -> None:
-    """Fill lengths and rates of ideal winches."""
+    """Fill lengths and rates of ideal winches, which follow their set points exactly."""
     if drives.kind == IDEAL:
         for i in range(rows.shape[1]):
             held = drives.now[HELD, i] > 0.0
@@ -236,7 +240,7 @@ def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -
 
 @glue
 def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Update the winches' speeds by forces that act for `time`; see `_kick_lagging`."""
+    """Update the speeds of all winches by forces that act for `time`. `begins` has the meaning of `_kick_lagging`."""
     if drives.kind == DRUMS:
         _kick_drums(drives, time)
     elif drives.kind == SECOND_ORDER:
@@ -254,7 +258,7 @@ def store_step_start(drives: Drives, rows: Array) -> None:
 
 @glue
 def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Pay out or wind in cable for `time`. Ideal winches are excepted, because they follow their set points."""
+    """Pay out or wind in cable for `time`. Ideal winches are skipped, because they follow their set points."""
     if drives.kind == DRUMS:
         turn_drums(drives, cables, rows, gravity, time)
     elif drives.kind == SECOND_ORDER:
@@ -275,6 +279,6 @@ def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) ->
 
 @glue
 def filter_tensions(drives: Drives, share: float) -> None:
-    """Update the filtered tensions; `share`: weight of the new reading."""
+    """Update the filtered tensions. `share`: weight of the new reading."""
     for i in range(drives.now.shape[1]):
         drives.now[FILTERED, i] += share * (drives.now[AT_FRAME, i] - drives.now[FILTERED, i])

@@ -1,4 +1,4 @@
-"""Simulation of a platform on massless cables: arrays, loads of the cables, and forces and powers at a time."""
+"""Simulation of a platform on massless cables: arrays, loads on the cables, and forces and powers at one time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import components_along, fill_motion_of_components
 
 SPLITTING, RUNGE_KUTTA = 0, 1
-DAMPED, LOADED, BLOWN = 1, 2, 4  # bits of the active damping and loads
+DAMPED, LOADED, BLOWN = 1, 2, 4  # one bit for each kind of damping or load that is active
 
 Losses = tuple[float, float]
 # code, k_h, k_p, gravity; True for pulleys or dead lengths, else None
@@ -122,7 +122,7 @@ def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array
 
 @glue
 def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
-    """Remove the part of `wrench` that acts along motions that the platform cannot make."""
+    """Remove the components of `wrench` along motions that the platform cannot make. `part` is work memory."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
         fill_motion_of_components(freedom, part, wrench)
@@ -161,14 +161,14 @@ def damp_cables(
     """Fill the damping wrench (6,) of the cables. Returns the power lost.
 
     The strain rate is the same along a whole cable, including the part between exit point and drum. Cable that is paid
-    out lengthens the span by its strained length. The rate of the chord minus the rate of this length is the rate at
-    which the cable stretches or changes its sag. Only stretching causes damping, with the factor EA/L. The fraction of
-    stretching is the elastic compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. For
-    the damping of the air, the cable moves like its chord.
+    out lengthens the span by its strained length. The cable stretches or changes its sag at the rate of the chord minus
+    the rate of the strained paid-out length. Only stretching causes damping, with the factor EA/L. The fraction of
+    stretching is the elastic compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. The
+    damping of the air is computed as if the cable moved like its chord.
 
     losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
-    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, in which the damping
-    parts of the tensions are filled; wrench: filled.
+    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives; the damping parts of
+        its tensions are filled; wrench: filled.
     """
     lost = 0.0
     wrench[:] = 0.0
@@ -207,7 +207,7 @@ def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
 
 @kernel
 def fill_forces(run: MasslessRun, now: float) -> None:
-    """Fill the force on the platform (-gradient), the given wrench, and the cable tensions at the time `now`."""
+    """Fill platform force (minus the energy gradient), given wrench, and cable tensions at the time `now`."""
     at, drives, rows, state = run.at, run.drives, run.rows, run.state
     fill_set_points(run, now, -progress.MOMENT * run.step)
     if run.work & LOADED:
@@ -248,7 +248,7 @@ def fill_damping(run: MasslessRun) -> None:
 
 @glue
 def add_powers(drives: Drives, time: float) -> None:
-    """Add the work of the powers during `time` to the audit. Cable damping acts on ideal and second-order winches."""
+    """Add the work of the powers during `time` to the audit. Cable damping works on all winches except drums."""
     power = drives.audit[d.GIVEN_POWER]
     if drives.kind != d.DRUMS:
         for i in range(drives.now.shape[1]):

@@ -17,7 +17,7 @@ from sagline.kernels.dynamics.progress import Courses, Kept
 from sagline.kernels.forward.platform import platform_energy
 from sagline.kernels.jit import entry, glue, kernel
 
-# largest energy error, relative to the exchanged energy MOVED; if the error is larger, the step is too long
+# largest energy error, relative to the exchanged energy (row MOVED); a larger error means that the step is too long
 GROWTH = 0.1
 
 
@@ -60,7 +60,7 @@ def record_step(run: massless.MasslessRun, records: massless.Records) -> None:
 
 @glue
 def runge_kutta_step(run: massless.MasslessRun, now: float) -> None:
-    """One step of the classical Runge-Kutta method. The forces at its end replace the forces at its start."""
+    """One step of the classical Runge-Kutta method. Forces at the step's end replace forces at the step's start."""
     h, drives, rows, state = run.step, run.drives, run.rows, run.state
     m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
     supplied, lost = 0.0, 0.0
@@ -110,7 +110,7 @@ def runge_kutta_step(run: massless.MasslessRun, now: float) -> None:
 
 @glue
 def splitting_step(run: massless.MasslessRun, now: float) -> None:
-    """One step of the splitting from the time `now`. The forces at its end replace the forces at its start."""
+    """One step of the splitting from the time `now`. Forces at the step's end replace forces at the step's start."""
     h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
     massless.fill_damping(run)
     massless.add_powers(drives, half)
@@ -177,10 +177,10 @@ def run_massless(
         robot: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass; row of
             the body_table with the center of mass at zero; row of inertia; free motions (n, 6).
         data: Data of the drives, (DATA_ROWS, m).
-        courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. For drums, each row
-            of the table contains lengths s along the path of winding, then expected tensions, (K, 2 m).
-        kept: State of a run before the steps, which is overwritten with the state after them; and work arrays.
-        records: Filled with states with angular velocity instead of angular momentum, frame-end tensions, lengths,
+        courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. Lengths for drums
+            are lengths s along the path of winding, followed in each row by expected tensions, (K, 2 m).
+        kept: State of the run, and work arrays. The state before the steps is overwritten with the state after them.
+        records: Filled with states (angular velocity in place of angular momentum), frame-end tensions, lengths,
             energies, notes.
         steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the initial state is
             evaluated.
@@ -202,7 +202,7 @@ def run_massless(
             or at[progress.RENEWED] > 0
         ):
             at[progress.RENEWED] = 0
-            massless.fill_set_points(moving, time, progress.MOMENT * step)  # rates may jump here
+            massless.fill_set_points(moving, time, progress.MOMENT * step)  # the rates may jump at this instant
         if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
             d.close_loops(drives, moving.targets, moving.target_rates, stride * step)
         if integrator == massless.SPLITTING:

@@ -1,4 +1,4 @@
-"""Simulations over time: time tables, counters, records and notes of events, and tasks of a control period."""
+"""Simulations over time: time tables, counters, records, notes of events, and the tasks of one control period."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.drives import Drives
 from sagline.kernels.jit import entry, formula, glue, kernel
 
-MOMENT = 1e-6  # largest difference of two equal instants, relative to a step
+MOMENT = 1e-6  # two instants count as equal up to this difference, relative to a step
 
 CubicTableArrays = tuple[Array, Array, Array, Array]  # a Course as passed from Python
 
 
 class CubicTable(NamedTuple):
-    """Piecewise cubic time table of n numbers with given values and rates; constant before and after the table."""
+    """Piecewise cubic time table of n numbers from values and rates; constant before its start and after its end."""
 
     time: Array  # instants [s], (K,), increasing
     value: Array  # values at these instants, (K, n)
@@ -28,9 +28,9 @@ class CubicTable(NamedTuple):
 
 @formula
 def interpolate_table(course: CubicTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
-    """Fill values and rates (n,) of `course` at the time `now`. Returns the interval; its search starts at `at`.
+    """Fill values and rates (n,) of `course` at the time `now`. Returns the interval, which is searched from `at` on.
 
-    shift: small time offset. At an instant of the table, a negative shift selects the interval that ends there, and a
+    `shift`: small time offset. At an instant of the table, a negative shift selects the interval that ends there, and a
     positive shift selects the interval that starts there.
     """
     times, last, moment = course.time, course.time.shape[0] - 1, now + shift
@@ -74,22 +74,22 @@ def time_tables(courses: Courses) -> tuple[CubicTable, CubicTable, CubicTable]:
 # counters of a run, which each call updates
 STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED = range(9)
 COUNTERS = 9
-# columns of the notes: event, time and cable; largest tensions before and after the event
-NOTE_TIME, NOTE_KIND, NOTE_CABLE, NOTE_BEFORE, NOTE_AFTER = range(5)
-NOTE_COLUMNS = 5
+# columns of the notes: event, time and cable; largest tensions before and after the event; state of the cable or drive
+NOTE_TIME, NOTE_KIND, NOTE_CABLE, NOTE_BEFORE, NOTE_AFTER, NOTE_STATE = range(6)
+NOTE_COLUMNS = 6
 NOTE_SLACK, NOTE_SATURATED = 0.0, 1.0
 # columns of the energies of a record
 KINETIC, POTENTIAL, SUPPLIED, LOST = range(4)
 ENERGY_COLUMNS = 4
 
-ROUNDING = 1e-9  # tolerance of the energy, relative to the sum of all its parts (for chains, relative to the weights)
+ROUNDING = 1e-9  # tolerance of the energy, relative to the sum of its parts (for chains, relative to the weights)
 
 
 @kernel
 def note_events(
     drives: Drives, rows: Array, cables: Array, at: Indices, now: float, weight_of: float, notes: Array
 ) -> None:
-    """Update the largest tensions. Record new events: a cable becomes slack, or a drive reaches its limit."""
+    """Update the largest tensions. Record each new event: a cable becomes slack, or a drive reaches its limit."""
     largest = 0.0
     for i in range(rows.shape[1]):
         tension = drives.now[d.AT_FRAME, i]
@@ -97,25 +97,26 @@ def note_events(
         largest = max(largest, tension)
         slack = not rows[g.TENSION, i] > 0.5 * cables[i, tables.DENSITY] * weight_of * rows[g.CHORD, i]
         known = drives.now[d.SLACK, i]
-        drives.now[d.SLACK, i] = (d.NEW if known == d.NO else known) if slack else d.NO
+        drives.now[d.SLACK, i] = (d.NEW + d.YES if known == d.NO else known) if slack else d.NO
     if at[NOTES] > 0:
         row = at[NOTES] - 1
         notes[row, NOTE_AFTER] = max(notes[row, NOTE_AFTER], largest)
     for i in range(rows.shape[1]):
         for kind in range(2):
             flag = d.SATURATED if kind == NOTE_SATURATED else d.SLACK
-            if drives.now[flag, i] == d.NEW:
-                drives.now[flag, i] = d.YES
+            if drives.now[flag, i] >= d.NEW:
+                drives.now[flag, i] -= d.NEW
                 if at[NOTES] < notes.shape[0]:
                     row = at[NOTES]
                     notes[row, NOTE_TIME], notes[row, NOTE_KIND], notes[row, NOTE_CABLE] = now, kind, i
                     notes[row, NOTE_BEFORE], notes[row, NOTE_AFTER] = drives.now[d.PEAK, i], largest
+                    notes[row, NOTE_STATE] = drives.now[flag, i]
                     at[NOTES] += 1
 
 
 @glue
 def has_room(at: Indices, notes: Array, cables: int) -> bool:
-    """True if the notes have space for all events that one step can cause."""
+    """True if `notes` has free rows for all events that one step can cause."""
     return at[NOTES] + 2 * cables <= notes.shape[0]
 
 
@@ -181,7 +182,7 @@ def begin_period(
 
 @entry
 def read_cells(tension: Array, cells: Array, noise: Array, reading: Array) -> None:
-    """Fill the readings of load cells, (m,): tensions with gain, bias and noise, limited to the range of the cells.
+    """Fill the readings of load cells, (m,): tensions with gain, bias and noise, clipped to the range of each cell.
 
     Args:
         tension: Filtered tensions [N], (m,).

@@ -1,8 +1,8 @@
-"""A rigid body in free motion and under forces: building blocks of the integrators.
+"""A rigid body in free motion and under forces: steps that the integrators combine.
 
 The body axes are the principal axes, with the origin at the center of mass. A state is a row of 13 numbers: position of
 the center of mass, unit quaternion (scalar last) of the rotation from body axes to world axes, velocity, and angular
-momentum in world axes. The first seven numbers are a pose row. The angular momentum is constant in free motion.
+momentum in world axes. The first seven numbers are a pose row. In free motion, the angular momentum is constant.
 docs/model.md, section 11; Dullweber, Leimkuhler & McLachlan, J. Chem. Phys. 107, 1997.
 """
 
@@ -51,8 +51,8 @@ def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
 def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
     """Rotate by the angle `share` * `pa` [rad] about the first axis. The three axes are in cyclic order.
 
-    The arguments are the vector part of the quaternion, its scalar part, and the angular momentum, each along these
-    axes. The results are the new quaternion, and the angular momentum along the second and third axis.
+    `a`, `b`, `c`: vector part of the quaternion along these axes. `w`: its scalar part. `pa`, `pb`, `pc`: angular
+    momentum along these axes. The results are the new quaternion and the new pb and pc.
     """
     angle = 0.5 * share * pa
     sine, cosine = math.sin(angle), math.cos(angle)
@@ -78,7 +78,7 @@ def free_turn(state: Array, inertia: Array, time: float) -> None:
     z, x, y, w, px, py = _turn_about(z, x, y, w, pz, px, py, time / inertia[MOMENTS + 2])
     y, z, x, w, pz, px = _turn_about(y, z, x, w, py, pz, px, by_y)
     x, y, z, w, py, pz = _turn_about(x, y, z, w, px, py, pz, by_x)
-    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # corrects only rounding errors
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # this scaling corrects only rounding errors
     state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3] = x * scale, y * scale, z * scale, w * scale
 
 
@@ -111,7 +111,7 @@ def power_of(wrench: Array, state: Array, spinning: Triple) -> float:
 
 @formula
 def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
-    """Fill the time derivative (13,) of a state under a wrench. It preserves the length of the quaternion."""
+    """Fill the time derivative (13,) of `state` under `wrench`. The length of the quaternion does not change."""
     wx, wy, wz = spin(state, inertia)
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
     for k in range(3):

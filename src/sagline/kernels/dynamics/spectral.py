@@ -27,7 +27,7 @@ from sagline.kernels.jit import entry, formula, kernel
 LARGEST_DEGREE = 48
 LEAST_DEGREE = 6
 HALF_WAVE = 1.5  # polynomial degree per half wavelength
-ALWAYS = 7.0  # polynomial degree that is added to the degree for the waves
+ALWAYS = 7.0  # constant that is added to the polynomial degree for the waves
 MOST_PHASE = math.pi * (LARGEST_DEGREE - ALWAYS) / HALF_WAVE
 
 Rule = tuple[Array, Array, Array, Array]
@@ -64,7 +64,7 @@ def element_from(string: String, omega: float, start: float, first: int) -> _Ele
 
 @formula
 def _element_flexibility(string: String, s: float) -> tuple[float, float, float, float, float, float, float]:
-    """Entries xx, xz, zz of C^-1, then those of C, at the material point `s`, and C normal to the plane."""
+    """Flexibility at the material point `s`: entries xx, xz, zz of C^-1 and then of C, and C normal to the plane."""
     vertical = vertical_at(string, s)
     square = string.horizontal * string.horizontal + vertical * vertical
     across = 1.0 / math.sqrt(square) + 1.0 / string.stiffness
@@ -124,7 +124,7 @@ def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) ->
 
 @kernel
 def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) -> None:
-    """Add the part of one element's stiffness that is due to stretching."""
+    """Add one element's stiffness against stretching to the in-plane stiffness `plane`."""
     n = part.degree + 1
     half = 0.5 * part.size
     for q in range(n):
@@ -173,7 +173,7 @@ def node_counts(strings: Array, omega: float, counts: Indices) -> None:
 
 @formula
 def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -> None:
-    """Fill static shapes xx, xz, zx, zz, yy times roots of masses, (nodes, 5), and masses of these motions, (4,)."""
+    """Fill static shapes xx, xz, zx, zz, yy times the roots of nodal masses, (nodes, 5), and effective masses, (4,)."""
     end = points[count - 1]
     determinant = end[2] * end[4] - end[3] * end[3]
     still[:] = 0.0
@@ -202,7 +202,7 @@ def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
 
 @formula
 def _scale_by_masses(matrix: Array, points: Array, used: int, each: int) -> None:
-    """Divide a stiffness by the square roots of the masses of its unknowns; `each`: unknowns per node."""
+    """Divide a stiffness matrix by the square roots of the masses of rows and columns. `each`: unknowns per node."""
     for i in range(used):
         first = 1.0 / math.sqrt(points[i // each, 1])
         for j in range(used):
@@ -211,7 +211,7 @@ def _scale_by_masses(matrix: Array, points: Array, used: int, each: int) -> None
 
 @formula
 def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
-    """Make the only flexible direction of the frame end its first unknown, and leave the second unknown unused."""
+    """Set the only flexible direction of the frame end as its first unknown; its second unknown remains unused."""
     x, z = strings[i, BEHIND_X], strings[i, BEHIND_Z]
     square = x * x + z * z
     if square > 0.0:
@@ -230,7 +230,7 @@ def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
 def spectral_matrices(
     strings: Array, omega: float, rule: Rule, points: Array, plane: Array, normal: Array, carried: Array, still: Array
 ) -> None:
-    """Matrices of m cables; the eigenvalues are the squared angular frequencies with both ends fixed.
+    """Matrices of m cables, whose eigenvalues are the squared natural angular frequencies with both ends fixed.
 
     Args:
         strings: (m, STRING_COLUMNS).
@@ -241,7 +241,7 @@ def spectral_matrices(
         normal: Filled with scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
         carried: Filled with the static motion of each node per motion of the platform end, times the root of the node's
             mass, (m, nodes, 5).
-        still: Filled with effective masses of the cable in this static motion, xx, xz, zz, yy, (m, 4) [kg].
+        still: Filled with effective masses [kg] of the cable in its static motion, (m, 4): xx, xz, zz, yy.
     """
     lobatto = Lobatto(*rule)
     stiff = 1e6 * omega * omega
@@ -288,7 +288,7 @@ def spectral_matrices(
 
 @entry
 def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values: Array) -> None:
-    """Fill matrices (m, count, nodes): displacements at equal steps of length, per scaled motion of each node."""
+    """Fill matrices (m, count, nodes) that give displacements at equal steps of length from the scaled node motions."""
     lobatto = Lobatto(*rule)
     count = values.shape[1]
     for i in range(strings.shape[0]):
@@ -310,7 +310,7 @@ def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values:
 
 @entry
 def stretch_matrices(strings: Array, omega: float, rule: Rule, points: Array, matrices: Array) -> None:
-    """Fill the part of the scaled in-plane stiffness that is due to stretching, (m, 2 nodes, 2 nodes)."""
+    """Fill the scaled in-plane stiffness against stretching alone, (m, 2 nodes, 2 nodes)."""
     lobatto = Lobatto(*rule)
     for i in range(strings.shape[0]):
         string = string_at(strings, i)

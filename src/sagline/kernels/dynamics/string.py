@@ -1,4 +1,4 @@
-"""One cable as a string that vibrates about its catenary, and the compliance of the cable on and beyond its pulley."""
+"""One cable as a string that vibrates about its catenary, and compliance of the cable between exit point and drum."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model, Terms, model_of
 from sagline.kernels.jit import entry, formula
 
-# columns of the table of strings, which are cables in vibration
+# columns of the table of strings; a string is a cable in vibration
 HORIZONTAL, VERTICAL = 0, 1  # T_x, T_z on the platform end [N]
 LENGTH = 2  # unstrained length of the free span [m]
 WEIGHT = 3  # weight per length [N/m]
 STIFFNESS = 4  # EA [N]
 DENSITY = 5  # [kg/m]
 # compliance [m/N] of the cable between frame end and drum: (x, z)^T (x, z) in the plane, and one value normal to it
-BEHIND_X, BEHIND_Z, BEHIND_Y = 6, 7, 8  # the first two in [sqrt(m/N)]
+BEHIND_X, BEHIND_Z, BEHIND_Y = 6, 7, 8  # x and z in [sqrt(m/N)]
 STRING_COLUMNS = 9
 
-SMOOTH = 0.5  # length of the longest element in which the flexibility C is smooth, in units of min N/w
+SMOOTH = 0.5  # length of the longest element in which the flexibility C is smooth, divided by (least force)/w
 TINY = 1e-300
 
 
@@ -80,7 +80,7 @@ def shortest_wave(string: String, omega: float) -> float:
 
 @formula
 def _longest_element(string: String, start: float, end: float, omega: float, phase: float) -> float:
-    """Length [m] of the longest element in an interval with smooth C and at most the given phase [rad] of a wave."""
+    """Length [m] of the longest element in an interval, for a smooth C and at most `phase` [rad] of a wave."""
     force = _least_force(string, start, end)
     return min(SMOOTH * force / (string.weight + TINY), phase / (omega * slowness(string, force) + TINY))
 
@@ -107,7 +107,7 @@ def element_length(string: String, start: float, omega: float, phase: float) -> 
 def fill_routing_compliance(
     terms: Terms, robots: Array, wraps: Array, leaving: Array, rows: Array, strings: Array
 ) -> None:
-    """Fill the last columns of the table of strings, (N, m, STRING_COLUMNS), for cables with pulleys or dead lengths.
+    """Fill the compliances in the table of strings, (N, m, STRING_COLUMNS), for cables with pulleys or dead lengths.
 
     Args:
         terms: Cable model.

@@ -1,7 +1,7 @@
 """Forward kinematics of a batch: the pose of the platform at rest on cables of given lengths; docs/model.md, section 6.
 
-For straight cables, the result is the least-squares pose, found by the Levenberg-Marquardt method. This model is for
-comparison with the exact cable. It does not distinguish slack cables from taut cables. All lengths have the same
+For straight cables, the result is the least-squares pose, found by the Levenberg-Marquardt method. The model of
+straight cables is for comparison with the exact cable. Straight cables are never slack. All lengths have the same
 weight. A mirrored pose fits the lengths as well as the true pose.
 """
 
@@ -24,14 +24,14 @@ from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory
 from sagline.kernels.statics import components_along, squares_along, step_pose, symmetric_part
 
-FLAT = 1e-9  # relative to the largest stiffness; a smaller stiffness counts as zero
+FLAT = 1e-9  # a stiffness below this share of the largest stiffness counts as zero
 OVERSTRETCHED = 0.1  # strain above which a result is unrealistic
 PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for finding the equilibrium, in the order in which they are tried
 
 
 @glue
 def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> int:
-    """Status of a stable platform: held by enough taut cables or not; `needed`: required number of taut cables."""
+    """Status of a stable platform, which depends on the number of taut cables. `needed`: required number."""
     taut = 0
     strain = 0.0
     for i in range(cables.shape[0]):
@@ -57,8 +57,8 @@ def _find_pose(
     """Find the equilibrium by the first method that succeeds. Returns the number of steps and the sum of tensions.
 
     On return, `space` contains unbalance, stiffness and factor of the stiffness at the pose. The first number of the
-    factor is NaN if there is no factor. `exact`: a model with an energy, whose equilibrium is the start for the model
-    of `problem`.
+    factor is NaN if there is no factor. `exact`: a model with an energy. The equilibrium with `exact` is the start of
+    the search with the model of `problem`.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0
@@ -92,12 +92,12 @@ def _find_pose(
 def _fill_stability(
     problem: f.PoseProblem, pose: Array, arcs: Array, size: float, space: f.ForwardArrays, numbers: Array
 ) -> int:
-    """Fill `numbers` for the pose in the work arrays, except residuals and steps. Returns the status."""
+    """Fill `numbers`, except residuals and steps, for the pose in the work arrays. Returns the status of the pose."""
     model, cables, body = problem.model, problem.cables, problem.body
-    numbers[f.ENERGY] = f.platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
+    numbers[tables.ENERGY] = f.platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
     symmetric_part(arcs, space.stiffness, space.matrix)
     low, high = extreme_eigenvalues(space.matrix, space.part, space.step, space.motion, FLAT)
-    numbers[f.STIFFNESS_MIN] = low
+    numbers[tables.STIFFNESS_MIN] = low
     status = codes.FORWARD_SOLVED if low > FLAT * high else codes.FORWARD_SINGULAR
     if low < -FLAT * high:
         status = codes.FORWARD_UNSTABLE
@@ -126,6 +126,8 @@ def _store_sample(problem: f.PoseProblem, rows: Array, p: int, results: Array, s
             results[tables.WRAPPED, p, i] = wrapped
             results[tables.DEAD, p, i] = dead
             results[tables.SINE, p, i] = rows[g.SINE, i]
+            if results.shape[0] > tables.RESULT_ROWS:
+                results[tables.AZIMUTH, p, i] = math.atan2(rows[g.AZIMUTH_Y, i], rows[g.AZIMUTH_X, i])
 
 
 @entry
@@ -141,8 +143,9 @@ def forward_poses(
 
     Args:
         model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
-            None. For shallow models, only the last steps use the model; the descent before them uses the exact cable.
-        chained: True if each sample starts at the previous result, and the first sample at starts[0].
+            None. With a shallow model, only the last steps use this model; the descent before them uses the exact
+            cable.
+        chained: True if the first sample starts at starts[0], and each later sample at the previous result.
         given: `ForwardSamples`.
         chain: `LastEquilibrium`. A chain of samples that starts at this pose also uses the stored stiffness.
         memory: Work arrays from `memory_for`, for the number of cables.
@@ -170,8 +173,11 @@ def forward_poses(
         status = _fill_stability(problem, pose, arcs, size, space, answer.numbers[p])
         components_along(batch.freedom, space.gradient, space.part)
         force, moment = squares_along(batch.freedom, space.part)
-        answer.numbers[p, f.FORCE_RESIDUAL], answer.numbers[p, f.MOMENT_RESIDUAL] = math.sqrt(force), math.sqrt(moment)
-        answer.numbers[p, f.ITERATIONS] = steps
+        answer.numbers[p, tables.FORCE_RESIDUAL], answer.numbers[p, tables.MOMENT_RESIDUAL] = (
+            math.sqrt(force),
+            math.sqrt(moment),
+        )
+        answer.numbers[p, tables.ITERATIONS] = steps
         answer.pose_statuses[p] = status
         copy(pose, answer.poses[p])
         _store_sample(problem, kept.rows, p, answer.results, answer.statuses)
@@ -180,11 +186,11 @@ def forward_poses(
             copy(pose, start)
             if not math.isnan(kept.factor[0, 0]):
                 copy(pose, kept.last)
-                copy(problem.wrench, kept.last[f.LAST_WRENCH :])
+                copy(problem.wrench, kept.last[tables.LAST_WRENCH :])
 
 
 FIT_STEPS = 200
-FIRST_DAMPING = 1e-3  # relative to the largest diagonal element
+FIRST_DAMPING = 1e-3  # initial shift of the diagonal, relative to its largest element
 SMALL_STEP = 1e-14  # a fit ends at a smaller step, in the problem's units
 NOTHING = 1e-13  # a fit ends at a smaller relative decrease of the cost
 
@@ -208,7 +214,7 @@ def _half_square_error(cables: Array, body: Array, lengths: Array, pose: Array, 
 
 @glue
 def _normal_equations(free: Array, cables: Array, lengths: Array, space: f.ForwardArrays) -> None:
-    """Fill matrix J^T J (n, n) and part J^T e (n,) of the length errors e along the free motions."""
+    """Fill J^T J (n, n) and J^T e (n,). J: derivatives of the length errors e by the free motions."""
     rows, matrix, part = space.rows, space.matrix, space.part
     full, row = space.gradient, space.step
     n = part.shape[0]
@@ -255,7 +261,7 @@ def _fit_pose(problem: f.PoseProblem, lengths: Array, pose: Array, space: f.Forw
             _normal_equations(free, cables, lengths, space)
             fitted = gain <= NOTHING * cost
         else:
-            fitted = length <= 1e-7  # squared errors have a rounding error of the square root of machine precision
+            fitted = length <= 1e-7  # a sum of squares determines the pose only to the square root of machine precision
             damping = max(10.0 * damping, 1e-12 * largest)
         if fitted:
             steps = iteration + 1
@@ -272,7 +278,7 @@ def fit_poses(
     memory: tuple[Array, Indices],
     found: f.SolutionArrays,
 ) -> None:
-    """Fit all samples; arguments as in `forward_poses`. Forces are NaN, and the energy is half the sum of squares."""
+    """Fit all samples; arguments as in `forward_poses`. Forces become NaN; the energy is half the sum of squares."""
     batch, answer, kept = f.ForwardSamples(*given), f.Solutions(*found), f.LastEquilibrium(*chain)
     count, m = batch.lengths.shape
     space, rest = f.new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
@@ -286,7 +292,7 @@ def fit_poses(
             copy(f.row_of(batch.starts, p), start)
         problem = f.problem_at(Model(codes.STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
         copy(start, pose)
-        answer.numbers[p, f.ENERGY], answer.numbers[p, f.ITERATIONS], fitted = _fit_pose(
+        answer.numbers[p, tables.ENERGY], answer.numbers[p, tables.ITERATIONS], fitted = _fit_pose(
             problem, batch.lengths[p], pose, space
         )
         answer.pose_statuses[p] = codes.FORWARD_FITTED if fitted else codes.FORWARD_NOT_CONVERGED

@@ -24,8 +24,8 @@ from sagline.kernels.statics import components_along, matrix_along, step_pose, s
 def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, work: Array, step: Array) -> float:
     """Fill the step s that minimizes g.s + s.H s/2 within |s| <= `radius`. Returns the shift mu.
 
-    The method of More and Sorensen solves (H + mu 1) s = -g with the smallest mu for which the matrix is positive
-    definite and the step is short enough. mu = 0 is an ordinary Newton step.
+    The method of More and Sorensen solves (H + mu 1) s = -g. The number mu is the smallest with a positive definite
+    matrix and a step that is short enough. For mu = 0, the step is an ordinary Newton step.
     """
     n = gradient.shape[0]
     frobenius = 0.0
@@ -61,7 +61,7 @@ NEAR = 3e-3  # length of a full Newton step below which Newton's method replaces
 PREDICTED = 0.03  # longest first-order step
 SHRINKING = 0.3  # largest ratio of a Newton step to the previous Newton step
 FRESH = 1e-4  # largest distance from the pose of a factored stiffness at which this stiffness is used again
-BALANCED = 1e-9  # relative to the sum of tensions and weight; a smaller unbalance counts as zero
+BALANCED = 1e-9  # an unbalance below this share of the sum of tensions and weight counts as zero
 LAST_DIGIT = 1e-15  # a shorter step is only a rounding error
 
 
@@ -70,6 +70,11 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
     """Add to `wrench` (6,) the first-order change of the cable forces due to the new `lengths` (m,)."""
     for i in range(cables.shape[0]):
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
+        if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+            wound = lengths[i] - length
+            change = (wound * rows[g.LONGER_X, i], wound * rows[g.LONGER_Y, i], wound * rows[g.LONGER_Z, i])
+            f.add_world_force(rows, i, change, wrench)
+            continue
         if model.behind is not None:
             x, z, _gives = end_motion_per_length(model, cables, rows, i)
             slope = force_change(plane_of(rows, i), PlaneVector(x, z))
@@ -82,7 +87,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
 
 @kernel
 def solve_step(factor: Array, part: Array, step: Array) -> float:
-    """Fill `step` (n,), which removes the unbalance `part` (n,), by the factored stiffness. Returns its length."""
+    """Fill the `step` (n,) that removes the unbalance `part` (n,), from the factored stiffness. Returns its length."""
     for j in range(part.shape[0]):
         step[j] = -part[j]
     solve_lower(factor, step)
@@ -94,7 +99,7 @@ def solve_step(factor: Array, part: Array, step: Array) -> float:
 def predict(
     problem: f.PoseProblem, lengths: Array, start: Array, last: Array, space: f.ForwardArrays, pose: Array
 ) -> bool:
-    """Fill the first-order change due to new lengths and wrench. False if no equilibrium is stored for `start`.
+    """Move `pose` by the first-order effect of new lengths and wrench. False if `last` has no equilibrium at `start`.
 
     Afterwards the rows contain the new lengths.
     """
@@ -103,7 +108,7 @@ def predict(
         known = known and last[k] == start[k]
     if known:
         for k in range(6):
-            space.gradient[k] = last[f.LAST_WRENCH + k] - problem.wrench[k]
+            space.gradient[k] = last[tables.LAST_WRENCH + k] - problem.wrench[k]
         _add_length_change(problem.model, problem.cables, lengths, space.rows, space.gradient)
         components_along(problem.free, space.gradient, space.part)
         known = solve_step(space.factor, space.part, space.step) <= PREDICTED
@@ -115,12 +120,12 @@ def predict(
 
 @glue
 def newton_from(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays) -> tuple[int, float]:
-    """Full Newton steps with the symmetric stiffness. Returns the number of steps and the last sum of tensions.
+    """Take full Newton steps with the symmetric stiffness. Returns the number of steps and the last sum of tensions.
 
-    The number is 0 if the stiffness is not positive definite or the first step is too long. The pose is then unchanged,
-    and matrix is its stiffness. The number is -1 if the steps do not decrease fast enough. On return, all arrays of
-    space belong to the final pose, except the stiffness. The skew part of the stiffness, which is half of a given
-    moment, is neglected; this costs one additional step.
+    The number is 0 if the stiffness is not positive definite or the first step is too long. In these cases, the pose is
+    unchanged, and `space.matrix` is the stiffness at the pose. The number is -1 if the steps do not decrease fast
+    enough. On return, all arrays of space belong to the final pose, except the stiffness. The skew part of the
+    stiffness (half of a given moment) is neglected, which costs one additional step.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     rotation, rows, gradient = space.rotation, space.rows, space.gradient
@@ -165,10 +170,10 @@ def newton_from(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays) -> 
 def _newton_steps(
     problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, best: float, good: float
 ) -> tuple[float, float]:
-    """One Newton step for the force balance, shortened until the unbalance is below `best`. Needs the stiffness.
+    """Take one Newton step for the force balance, shortened until the unbalance is below `best`. Uses the stiffness.
 
     Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
-    unchanged. If the unbalance is below `good`, only the full step is tried, because rounding can make it worse.
+    unchanged. If the unbalance is below `good`, only the full step is tried, because rounding can increase it.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     step, trial, part = space.step, space.trial, space.part
@@ -201,9 +206,9 @@ def _newton_steps(
 
 @glue
 def polish(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, good: float) -> int:
-    """Newton steps for the force balance until the unbalance no longer decreases. Returns the number of steps.
+    """Take Newton steps for the force balance until the unbalance no longer decreases. Returns the number of steps.
 
-    good: an unbalance below this counts as zero. The work arrays belong to the initial pose before the steps, and to
+    `good`: an unbalance below this counts as zero. The work arrays belong to the initial pose before the steps, and to
     the final pose after the steps. The stiffness may belong to a pose that differs by rounding errors.
     """
     best = components_along(problem.free, space.gradient, space.part)
@@ -212,7 +217,7 @@ def polish(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, good: fl
     for iteration in range(POLISH_STEPS):
         f.platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
         best, length = _newton_steps(problem, pose, space, best, good)
-        # the length of a step is about the error before the step; the next length would be about length^3/before^2
+        # a step is about as long as the error before it; the next step would be about length^3/before^2
         if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
             steps = iteration + 1
             break
@@ -229,11 +234,11 @@ NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 @glue
 def descend(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, known: float) -> tuple[int, float]:
-    """Decrease the energy until a full Newton step is short. A start in equilibrium does not move, even if unstable.
+    """Decrease the energy until a full Newton step is short. A pose in equilibrium stays, even if it is unstable.
 
-    known: the sum of tensions at the pose, if space belongs to this pose and matrix is its stiffness; otherwise 0.
+    `known`: sum of tensions at the pose if `space` contains the arrays and the stiffness of this pose; otherwise 0.
 
-    Returns the number of tried steps, and the sum of tensions at the pose (0 if the last tried pose is not the result).
+    Returns the number of tried steps, and the sum of tensions at the pose. The sum is 0 if the last pose was rejected.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     trial, motion, rotation, rows, gradient = space.trial, space.motion, space.rotation, space.rows, space.gradient
@@ -253,10 +258,10 @@ def descend(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, known: 
                 break
         else:
             gain = energy - new_energy
-            for k in range(3):  # the work of a given moment along the motion
+            for k in range(3):  # minus the work of the given moment along the motion
                 gain += wrench[3 + k] * motion[3 + k]
             noise = NOISE * (size + new_size)
-            fresh = gain + noise >= 0.1 * promised  # also False for NaN
+            fresh = gain + noise >= 0.1 * promised  # the comparison is also False for NaN
             if not fresh:
                 radius = 0.3 * min(length, radius)
                 tensions = 0.0
@@ -287,7 +292,7 @@ def descend(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, known: 
 
 @glue
 def _promised_gain(matrix: Array, gradient: Array, step: Array) -> float:
-    """Decrease of the quadratic model of the energy along a step."""
+    """Decrease of the energy along `step`, predicted by the quadratic model."""
     gain = 0.0
     for j in range(step.shape[0]):
         gain -= gradient[j] * step[j]

@@ -1,7 +1,7 @@
-"""The platform on cables of given lengths: data of the forward kernels, wrench at a pose, and stiffness.
+"""The platform on cables with given lengths: data of the forward kernels, wrench on the platform, and stiffness.
 
-A motion is a displacement of the center of mass and a rotation vector in world axes. Its rotation is applied after the
-rotation of the pose. The unbalance is minus the total wrench on the platform: the gradient of the energy.
+A motion is a displacement of the center of mass and a rotation vector in world axes. The rotation of a motion follows
+the rotation of the pose. The unbalance, minus the total wrench on the platform, is the gradient of the energy.
 """
 
 from __future__ import annotations
@@ -20,18 +20,10 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import Triple, is_rotation
 
-UNIT_SHARE = 0.2  # relative to the mean length; a displacement of this size has the same weight as a rotation by 1 rad
-
-# columns of the numbers that describe one solution
-ENERGY, FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN, ITERATIONS = 0, 1, 2, 3, 4
-FORWARD_NUMBERS = 5
-
-# columns of the state of a chain of samples: pose, then wrench
-LAST_WRENCH = tables.POSE_COLUMNS
-LAST_COLUMNS = LAST_WRENCH + 6
+UNIT_SHARE = 0.2  # displacement with the same weight as a rotation by 1 rad, relative to the mean length
 
 ForwardTerms = tuple[int, float, float, bool | None]  # code, k_h, k_p; True for pulleys or dead lengths, else None
-SampleArrays = tuple[Array, Array, Array, Array, Array, Array]  # as Python passes it: plain tuples are fastest
+SampleArrays = tuple[Array, Array, Array, Array, Array, Array]  # arrays from Python: plain tuples are fastest
 SolutionArrays = tuple[Array, Array, Codes, Array, Codes]
 LastEquilibriumArrays = tuple[Array, Array, Array]
 
@@ -73,7 +65,7 @@ class PoseProblem(NamedTuple):
     cables: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
     body: Array  # row of the body_table, (BODY_COLUMNS,)
     wrench: Array  # external plus inertial wrench, about the center of mass, (6,)
-    unit: float  # norm of the units; a sum of forces times this norm is comparable to components along the free motions
+    unit: float  # norm of the units; a force times this norm is comparable to components along the free motions
 
 
 class ForwardArrays(NamedTuple):
@@ -93,7 +85,7 @@ class ForwardArrays(NamedTuple):
 
 @glue
 def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[ForwardArrays, Memory]:
-    """Work arrays, and the remaining memory; the given rows and factor keep their content between calls."""
+    """Work arrays, and the remaining memory. `rows` and `factor` keep their content between calls."""
     n = factor.shape[0]
     rotation, memory = block(memory, 3, 3)
     gradient, memory = vector(memory, 6)
@@ -108,7 +100,7 @@ def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[Forw
 
 @glue
 def new_motions(memory: Memory, n: int) -> tuple[Array, Array, Array, Array]:
-    """Arrays: free motions (n, 6) in the units of steps, free motions in the units of stiffness, and two pose rows."""
+    """Memory for the free motions (n, 6) in units of steps and in units of stiffness, and for two pose rows."""
     free, memory = block(memory, n, 6)
     arcs, memory = block(memory, n, 6)
     poses, memory = block(memory, 2, tables.POSE_COLUMNS)
@@ -117,13 +109,13 @@ def new_motions(memory: Memory, n: int) -> tuple[Array, Array, Array, Array]:
 
 @glue
 def row_of(array: Array, p: int) -> Array:
-    """Row p of an array with N rows; the only row of an array with one row."""
+    """Row `p` of an array with N rows, or the only row of an array with one row."""
     return array[min(p, array.shape[0] - 1)]
 
 
 @glue
 def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: Array) -> PoseProblem:
-    """Problem of sample `p` of a batch. Its model has the gravity of its robot. Fills the free motions."""
+    """Problem of sample `p` of a batch. The cable model gets the gravity of the robot. Fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
     unit = _fill_free(given.freedom, given.lengths[p], free)
@@ -133,7 +125,7 @@ def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: A
 
 @kernel
 def _fill_free(freedom: Array, lengths: Array, free: Array) -> float:
-    """Fill the free motions in the units of steps, (n, 6). Returns the norm of these units."""
+    """Fill the free motions in the units of steps, (n, 6). Returns the norm of the units."""
     m = lengths.shape[0]
     total = 0.0
     for i in range(m):
@@ -169,13 +161,13 @@ def fill_arcs(freedom: Array, cables: Array, body: Array, arcs: Array) -> None:
 
 @glue
 def clear_solution(found: Solutions, p: int, status: int, cable_status: int) -> None:
-    """Fill the arrays for sample `p` without a result: NaN as values, zero iterations, and the statuses."""
+    """Fill the arrays of a sample `p` that has no result: NaN as values, zero iterations, and the statuses."""
     found.poses[p] = math.nan
     found.statuses[p] = cable_status
     for row in range(found.results.shape[0]):
         found.results[row, p] = math.nan
     found.numbers[p] = math.nan
-    found.numbers[p, ITERATIONS] = 0.0
+    found.numbers[p, tables.ITERATIONS] = 0.0
     found.pose_statuses[p] = status
 
 
@@ -186,10 +178,10 @@ Six = tuple[float, float, float, float, float, float]
 def unbalance(
     model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array, gradient: Array
 ) -> float:
-    """Fill rotation, geometry, cable forces, statuses and unbalance (6,) at `pose`. It is the energy's gradient.
+    """Fill rotation, geometry, cable forces and statuses at `pose`, and the unbalance `gradient` (6,).
 
-    The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N], to which the
-    unbalance is relative.
+    The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N]: the reference of a
+    relative unbalance.
     """
     cable_geometry(cables, body, pose, rotation, rows)
     forces_from_lengths(model, cables, rows, model.behind)
@@ -207,14 +199,19 @@ def unbalance(
 @formula
 def add_force(rows: Array, i: int, horizontal: float, vertical: float, wrench: Array) -> None:
     """Add to `wrench` (6,) a force at the platform end of cable `i`, in the cable's plane."""
-    x = horizontal * rows[g.AZIMUTH_X, i]
-    y = horizontal * rows[g.AZIMUTH_Y, i]
+    add_world_force(rows, i, (horizontal * rows[g.AZIMUTH_X, i], horizontal * rows[g.AZIMUTH_Y, i], vertical), wrench)
+
+
+@formula
+def add_world_force(rows: Array, i: int, force: Triple, wrench: Array) -> None:
+    """Add to `wrench` (6,) a `force` at the platform end of cable `i`, world axes [N]."""
+    x, y, z = force
     rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
     wrench[0] += x
     wrench[1] += y
-    wrench[2] += vertical
-    wrench[3] += ry * vertical - rz * y
-    wrench[4] += rz * x - rx * vertical
+    wrench[2] += z
+    wrench[3] += ry * z - rz * y
+    wrench[4] += rz * x - rx * z
     wrench[5] += rx * y - ry * x
 
 
@@ -225,7 +222,7 @@ def platform_energy(
     """Energy [J] after `unbalance` at the pose, and the sum of the magnitudes of its terms (a measure of rounding).
 
     The terms are the energies of cables, weight and given force. The result is NaN if the cable model has no energy. A
-    given moment, which is constant in world axes, has no potential energy. It is therefore not included.
+    given moment, which is constant in world axes, has no potential energy. A given moment is therefore not included.
     """
     energy, size = energy_of_cables(model, cables, rows, model.behind)
     for k in range(3):
@@ -239,8 +236,14 @@ def platform_energy(
 
 
 @formula
-def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
+def end_stiffness(cables: Array, rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
     """Stiffness of cable `i` at its platform end in world axes [N/m]: nine numbers, row by row."""
+    if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        return (
+            (rows[g.W_XX, i], rows[g.W_XY, i], rows[g.W_XZ, i]),
+            (rows[g.W_XY, i], rows[g.W_YY, i], rows[g.W_YZ, i]),
+            (rows[g.W_XZ, i], rows[g.W_YZ, i], rows[g.W_ZZ, i]),
+        )
     xx, xz, zx, zz = plane_of(rows, i)
     across = rows[g.ACROSS, i]
     c, s = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
@@ -267,12 +270,13 @@ def _add_row(target: Array, share: float, row: Six) -> None:
 def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Array) -> None:
     """Fill the derivative (6, 6) of the unbalance after `unbalance`: the sum of elastic, sag and geometric stiffness.
 
-    Its skew part is half the moment of the cable forces. This part is zero in equilibrium without a given moment.
+    The skew part of the stiffness is half the moment of the cable forces. This part is zero in equilibrium without a
+    given moment.
     """
     stiffnesses_in_plane(model, cables, rows, model.behind)
     stiffness[:] = 0.0
     for i in range(cables.shape[0]):
-        (kxx, kxy, kxz), (kyx, kyy, kyz), (kzx, kzy, kzz) = end_stiffness(rows, i)
+        (kxx, kxy, kxz), (kyx, kyy, kyz), (kzx, kzy, kzz) = end_stiffness(cables, rows, i)
         x, y, z = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
         # a rotation about an axis e moves the platform end by e x r
         by_x = (kxx, kxy, kxz, kxz * y - kxy * z, kxx * z - kxz * x, kxy * x - kxx * y)
@@ -287,7 +291,7 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
         _add_row(stiffness[4], -x, by_z)
         _add_row(stiffness[5], x, by_y)
         _add_row(stiffness[5], -y, by_x)
-        # the force keeps its direction while r turns: r T^T - (r.T) 1
+        # a constant force while r turns: r T^T - (r.T) 1
         tx = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
         ty = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
         tz = rows[g.VERTICAL, i]

@@ -8,9 +8,11 @@ from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import copy, extreme_eigenvalues
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
+from sagline.kernels.cable.swivel import force_slopes_of_swivel
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.forward import FLAT
@@ -36,12 +38,15 @@ def _describe_cable(
     model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array
 ) -> None:
     """Fill `block` (3, 3), `slopes` (DATA, m, 3) and `lever` (3,) of cable `i`, after `platform_stiffness`."""
-    across = f.end_stiffness(rows, i)
+    across = f.end_stiffness(cables, rows, i)
     for j in range(3):
         block[0, j] = across[0][j]
         block[1, j] = across[1][j]
         block[2, j] = across[2][j]
         lever[j] = rows[g.LEVER_X + j, i]
+    if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        force_slopes_of_swivel(model, cables, rows, i, slopes)
+        return
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, force, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
     free = length if model.behind is None else rows[g.FREE_LENGTH, i]
@@ -64,13 +69,13 @@ def describe_states(
     slopes: Array,
     levers: Array,
 ) -> None:
-    """Stiffness and sensitivities of N samples; NaN for straight cables and if lengths are NaN.
+    """Stiffness and sensitivities of N samples, NaN for straight cables and for lengths that are NaN.
 
-    The arguments are those of `forward_poses`, whose initial poses are the equilibria, and arrays to be filled:
+    The arguments are the same as in `forward_poses`, with equilibria as initial poses. To be filled:
 
-    matrices: stiffness of the platform, (N, 6, 6); blocks: stiffness of every cable's platform end in world axes, (N,
-    m, 3, 3); slopes: derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3); levers:
-    vectors from the center of mass to the platform ends, (N, m, 3).
+    `matrices`: stiffness of the platform, (N, 6, 6). `blocks`: stiffness of every cable's platform end in world axes,
+    (N, m, 3, 3). `slopes`: derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3).
+    `levers`: vectors from the center of mass to the platform ends, (N, m, 3).
     """
     batch = f.ForwardSamples(*given)
     code, k_h, k_p, behind = model
@@ -108,7 +113,7 @@ def _fill_rows(model: Model, cables: Array, results: Array, p: int, rows: Array)
             rows[g.WRAP, i] = results[tables.WRAP, p, i]
             rows[g.FREE_LENGTH, i] = rows[g.LENGTH, i] - (results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i])
         for i in range(rows.shape[1]):
-            # tension and direction at the exit point; cables of the shallow models leave along their chord
+            # tension and direction at the exit point; a cable of a shallow model leaves its pulley along the chord
             rows[g.LEAVING, i] = rows[g.TENSION, i]
             rows[g.WRAP_SINE, i] = rows[g.COSINE, i]
             rows[g.WRAP_COSINE, i] = pulley_at(cables, i).entry * rows[g.SINE, i]
@@ -132,9 +137,9 @@ def stabilities_of_poses(
 ) -> None:
     """Decide whether the equilibria of solved poses are stable.
 
-    The arguments are those of `inverse_poses` and `forward_poses`, and the indices of the poses, `which` (K,). Their
-    statuses become POSE_UNSTABLE if some free motion does not have a positive stiffness, else POSE_SOLVED. The
-    stiffness of straight cables is undefined; poses with straight cables therefore count as solved.
+    The arguments are the same as in `inverse_poses` and `forward_poses`; `which` (K,) are the indices of the poses. The
+    status of each becomes POSE_SOLVED if every free motion has a positive stiffness, else POSE_UNSTABLE. The stiffness
+    of straight cables is undefined. Poses with straight cables therefore count as solved.
     """
     code, k_h, k_p, behind = terms
     freedom, bodies, tables_of_cables = robots
@@ -152,7 +157,12 @@ def stabilities_of_poses(
         body, cables = f.row_of(bodies, p), f.row_of(tables_of_cables, p)
         model = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         cable_geometry(cables, body, poses[p], rotation, rows)
-        _fill_rows(model, cables, results, p, rows)
+        if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+            copy(results[tables.LENGTH, p], rows[g.LENGTH])
+            rows[g.PARAMETER] = math.nan
+            forces_from_lengths(model, cables, rows, behind)
+        else:
+            _fill_rows(model, cables, results, p, rows)
         f.platform_stiffness(model, cables, rows, stiffness)
         f.fill_arcs(freedom, cables, body, arcs)
         symmetric_part(arcs, stiffness, matrix)

@@ -1,10 +1,10 @@
-"""Least distances of sagging cables from cables, rods and boxes, with bounds that branch and bound proves.
+"""Least distances of sagging cables from cables, rods and boxes, with bounds proved by branch and bound.
 
-A cable is divided into pieces. The bulge of a piece is an upper bound of the distance between piece and chord. The
-distance of two chords minus both bulges is a lower bound of the distance of the pieces. Points of the cables give an
-upper bound, which Newton's method improves to full precision. A pair of pieces is finished when the two bounds differ
-by less than the precision. Otherwise one piece is split. If a cable occurs in several pairs, these pairs use the same
-pieces. docs/model.md, section 13.
+A cable is divided into pieces. The bulge of a piece is an upper bound of the distance between piece and chord. A lower
+bound of the distance of two pieces is the distance of their chords minus both bulges. An upper bound is the distance of
+two points of the cables; Newton's method improves it to full precision. A pair of pieces is finished when the two
+bounds differ by less than the precision. A pair that is not finished is continued with one piece split. If a cable
+occurs in several pairs, these pairs use the same pieces. docs/model.md, section 13.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ PIECES = 8192  # largest number of pieces of all cables of a pose
 # index of the last row, which contains the number of pieces in its last column, and an edge of a box before it
 COUNTER = PIECES - 1
 WAITING = 4096  # largest number of waiting pairs of pieces
-# largest number of examined pairs per distance; after this number the search ends with its present lower bound
+# largest number of examined pairs per distance; after it, the search returns its present lower bound
 PAIRS = 100_000
 ROUNDING = 1e-13  # rounding error of a lower bound, relative to the coordinates
 FAR = 1e300
@@ -82,7 +82,7 @@ def _split_piece(pieces: Array, index: int, row: Array) -> None:
 
 @kernel
 def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[float, float, float, float]:
-    """Distance of the chords of the pieces `i` and `j` [m], lower bound for the pieces, shares of nearest points."""
+    """Distance [m] of the chords of the pieces `i` and `j`, lower bound for the pieces, nearest points as shares."""
     one = pieces[i]
     if to_a_box:
         square, low, s = shapes.to_box(one, box)
@@ -99,7 +99,7 @@ def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -
 
 @kernel
 def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
-    """Local minimum of the distance of a pair [m], and its two shares. The search starts at the shares `s` and `t`."""
+    """Local minimum [m] of the distance of a pair, and the two shares of its points; searched from `s` and `t`."""
     if to_a_box:
         square, s = shapes.nearest_to_box(one, other, s)
     else:
@@ -121,9 +121,9 @@ def _square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> 
 def _least_of_pair(
     one: Array, other: Array, i: int, j: int, precision: float, enough: float, pieces: Array, waiting: Array
 ) -> tuple[float, float, float, float]:
-    """Least distance of a cable from another cable or a box [m], a proved lower bound, and the two points.
+    """Least distance [m] of a cable from another cable or a box, a proved lower bound, and the two nearest points.
 
-    For distances above `enough` the search ends early, with a lower bound of at least `enough` - precision.
+    If the distance exceeds `enough`, the search ends early with a lower bound of at least `enough` - `precision`.
     """
     to_a_box = other[shapes.KIND] == shapes.BOX
     distance, low, s, t = _chord_distance(pieces, i, j, other, to_a_box)
@@ -187,7 +187,7 @@ def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
 
 @kernel
 def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
-    """Least of the distance `best` [m] and the distances of the edges of `box` from `other`. Fills `nearest`."""
+    """The smaller of `best` [m] and the least distance of an edge of `box` from the box `other`. Fills `nearest`."""
     for axis in range(3):
         for corner in range(4):
             _edge_of(box, axis, corner, edge)
@@ -237,7 +237,7 @@ def least_distances(
     low_out: Array,
     nearest_out: Array,
 ) -> None:
-    """Least distances of pairs at every pose, minus the radii, with proved lower bounds and the nearest points.
+    """Fill the least distances of pairs at every pose, minus the radii, with proved lower bounds and nearest points.
 
     Args:
         moving: Shapes that move with the pose, shape (N, K, COLUMNS).
@@ -245,8 +245,8 @@ def least_distances(
         pairs: Indices of two shapes, shape (P, 2). The indices of fixed shapes follow the indices of moving shapes. A
             box is the second shape of a pair.
         precision: Largest difference of the lower bound from the distance [m].
-        together: True if only the least distance of all pairs of a pose is required. The other distances then get only
-            bounds.
+        together: True if only the least distance over all pairs of a pose is required. If True, all other pairs get
+            only bounds.
         pieces: Work array from `work_arrays_for_pieces`.
         waiting: Work array from `work_arrays_for_pieces`.
         distance_out: Filled with the distances [m], shape (N, P).
@@ -287,7 +287,7 @@ def least_distances(
 
 @entry
 def cut_piece(row: Array, ranges: Array, pieces_out: Array) -> None:
-    """Pieces of one cable or rod.
+    """Fill chords and bulges of pieces of one cable or rod.
 
     Args:
         row: The cable, shape (COLUMNS,).

@@ -15,7 +15,7 @@ from sagline.kernels.jit import kernel
 # Columns of a row.
 KIND = 0
 PLACE = 1  # three: exit point of a cable, start of a rod, or center of a box [m]
-RADIUS = 4  # half the diameter, which is subtracted from distances [m]
+RADIUS = 4  # radius, which is subtracted from distances [m]
 FIRST = 5  # first and last measured point of a cable or rod, as shares of its unstrained length
 LAST = 6
 LEVEL = 7  # two: horizontal unit vector toward the platform end
@@ -61,7 +61,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
     vertical = row[VERTICAL] - weight * length * (1.0 - share)
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
     give = 1.0 / row[STIFFNESS]
-    if tension == 0.0:  # turning point of a fold, where the direction is undefined
+    if tension == 0.0:  # the turning point of a fold has no direction
         return 0.0, 0.0, 0.0, weight * give * length * length
     inverse = 1.0 / tension
     bend = weight * horizontal * inverse * inverse * inverse * length * length
@@ -71,7 +71,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
 
 @kernel
 def level_point(row: Array) -> float:
-    """Position of a catenary's horizontal tangent as a fraction of its length. It can be beyond an end of the cable."""
+    """Position of a catenary's horizontal tangent as a fraction of its length; it may be beyond an end of the cable."""
     if row[KIND] != HANGING:
         return -1.0
     return 1.0 - row[VERTICAL] / (row[WEIGHT] * row[LENGTH])
@@ -81,8 +81,8 @@ def level_point(row: Array) -> float:
 def bulge(row: Array, first: float, last: float, chord2: float) -> float:
     """Largest distance of the points of a piece from its chord [m]; `square` is the squared chord.
 
-    The result is the smaller of two upper bounds. The first is |r''| (s1 - s0)^2/8 with the least tension on the piece.
-    The second follows from the length of the piece and the distance of its ends, and is also valid for folds.
+    The result is the smaller of two upper bounds. The first bound is |r''| (s1 - s0)^2/8 with the least tension on the
+    piece. The second bound follows from the length of the piece and the distance of its ends, also for folds.
     """
     width = last - first
     if row[KIND] != HANGING:
@@ -101,19 +101,19 @@ def bulge(row: Array, first: float, last: float, chord2: float) -> float:
     elif v0 < -slack and v1 > slack:
         bend = math.inf
     by_curvature = 0.125 * part * part * (bend + weight * give)
-    if by_curvature * by_curvature < 1e-4 * chord2:  # for a shallow piece the second bound is not smaller
+    if by_curvature * by_curvature < 1e-4 * chord2:  # for a shallow piece, the second bound is never the smaller bound
         return by_curvature
     arc = part * (1.0 + math.sqrt(most2) * give)
     by_length = 0.5 * math.sqrt(max(arc * arc - chord2, 0.0))
     return min(by_curvature, by_length)
 
 
-STEPS = 12  # Newton steps; the slope has at most six straight parts
+STEPS = 12  # Newton steps: at most six, because the slope has at most six straight parts
 
 
 @kernel
 def between_segments(one: Array, other: Array) -> tuple[float, float, float, float]:
-    """Squared distance [m^2] of segments (x0, y0, z0, x1, y1, z1), its lower bound, and their nearest shares."""
+    """Squared distance [m^2] of two segments (x0, y0, z0, x1, y1, z1), a lower bound, and nearest points as shares."""
     ax, ay, az = one[3] - one[0], one[4] - one[1], one[5] - one[2]
     bx, by, bz = other[3] - other[0], other[4] - other[1], other[5] - other[2]
     rx, ry, rz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
@@ -141,7 +141,7 @@ def between_segments(one: Array, other: Array) -> tuple[float, float, float, flo
 
 
 @kernel
-def in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Convert the vector (x, y, z) to the axes of `box`."""
     return (
         box[AXES] * x + box[AXES + 3] * y + box[AXES + 6] * z,
@@ -152,15 +152,15 @@ def in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float,
 
 @kernel
 def outside(coordinate: float, half: float) -> float:
-    """Signed distance of `coordinate` from the nearer face of a box. 0 between the two faces."""
+    """Signed distance of `coordinate` from the nearer of two faces at -`half` and `half`; 0 between the faces."""
     return coordinate - min(max(coordinate, -half), half)
 
 
 @kernel
 def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
     """Squared distance [m^2] between a segment and a box, its lower bound, and the share of the nearest point."""
-    px, py, pz = in_box_axes(box, segment[0] - box[PLACE], segment[1] - box[PLACE + 1], segment[2] - box[PLACE + 2])
-    dx, dy, dz = in_box_axes(box, segment[3] - segment[0], segment[4] - segment[1], segment[5] - segment[2])
+    px, py, pz = _in_box_axes(box, segment[0] - box[PLACE], segment[1] - box[PLACE + 1], segment[2] - box[PLACE + 2])
+    dx, dy, dz = _in_box_axes(box, segment[3] - segment[0], segment[4] - segment[1], segment[5] - segment[2])
     hx, hy, hz = box[HALF], box[HALF + 1], box[HALF + 2]
     low, high, t = 0.0, 1.0, 0.5
     ex = ey = ez = 0.0
@@ -197,7 +197,7 @@ def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
 @kernel
 def nearest_in_box(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Point of `box` that is nearest to the point (x, y, z) [m]."""
-    px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
+    px, py, pz = _in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])
     return (
         x - (box[AXES] * ex + box[AXES + 1] * ey + box[AXES + 2] * ez),
@@ -214,14 +214,14 @@ def _length(x: float, y: float, z: float) -> float:
 
 ITERATIONS = 30
 HALVINGS = 6
-# relative to the cable's length; the search ends after a smaller step, because Newton's method squares the error
+# the search ends after a step below this share of the cable's length, because Newton's method squares the error
 SMALL = 1e-8
-FLAT = 1e-13  # relative to the product of curvatures; a smaller determinant means parallel cables
+FLAT = 1e-13  # a determinant below this share of the product of curvatures means parallel cables
 
 
 @kernel
 def square_between(one: Array, other: Array, s: float, t: float) -> float:
-    """Squared distance of two points on cables [m^2]."""
+    """Squared distance [m^2] of the point `s` of cable `one` from the point `t` of cable `other`."""
     ax, ay, az = point(one, s)
     bx, by, bz = point(other, t)
     return (ax - bx) * (ax - bx) + (ay - by) * (ay - by) + (az - bz) * (az - bz)
@@ -229,7 +229,7 @@ def square_between(one: Array, other: Array, s: float, t: float) -> float:
 
 @kernel
 def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
-    """Squared distance at two shares of the cable lengths, and the shares, within their ranges, after a Newton step."""
+    """Squared distance at the shares `s` and `t`, and both shares after a Newton step that stays in their ranges."""
     ax, ay, az = point(one, s)
     bx, by, bz = point(other, t)
     rx, ry, rz = ax - bx, ay - by, az - bz
@@ -252,7 +252,7 @@ def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, f
             determinant = max(hss * htt - hst * hst, FLAT * uu * vv)
         ds = -(gs * htt - gt * hst) / determinant
         dt = -(gt * hss - gs * hst) / determinant
-        # a share at a bound stays there; then only the other share changes
+        # a share at the end of its range stays there; then only the other share changes
         new_s, new_t = min(max(s + ds, one[FIRST]), one[LAST]), min(max(t + dt, other[FIRST]), other[LAST])
         if new_s != s + ds and new_t == t + dt:
             new_t = min(max(t - (gt + hst * (new_s - s)) / htt, other[FIRST]), other[LAST])
@@ -269,7 +269,7 @@ def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, f
 
 @kernel
 def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
-    """Local minimum of the squared distance of two cables [m^2] near two points, and the points of the minimum."""
+    """Local minimum [m^2] of the squared distance of two cables, and its shares; the search starts at `s` and `t`."""
     square, new_s, new_t = _newton_step(one, other, s, t)
     for _ in range(ITERATIONS):
         ds, dt = new_s - s, new_t - t
@@ -291,13 +291,13 @@ def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[flo
 
 @kernel
 def _box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
-    """Squared distance of a cable point from a box [m^2], and the share (within its range) after a Newton step."""
+    """Squared distance [m^2] of the cable point `s` from a box, and the share after a Newton step, within its range."""
     x, y, z = point(curve, s)
-    px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
+    px, py, pz = _in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])
     dx, dz, dx2, dz2 = slopes(curve, s)
-    ux, uy, uz = in_box_axes(box, dx * curve[LEVEL], dx * curve[LEVEL + 1], dz)
-    vx, vy, vz = in_box_axes(box, dx2 * curve[LEVEL], dx2 * curve[LEVEL + 1], dz2)
+    ux, uy, uz = _in_box_axes(box, dx * curve[LEVEL], dx * curve[LEVEL + 1], dz)
+    vx, vy, vz = _in_box_axes(box, dx2 * curve[LEVEL], dx2 * curve[LEVEL + 1], dz2)
     slope = ex * ux + ey * uy + ez * uz
     bend = 0.0
     if ex != 0.0:
@@ -315,7 +315,7 @@ def _box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
 
 @kernel
 def nearest_to_box(curve: Array, box: Array, s: float) -> tuple[float, float]:
-    """Local minimum of the squared distance of a cable from a box [m^2] near a point, and the point of the minimum."""
+    """Local minimum [m^2] of the squared distance of a cable from a box, and its share; the search starts at `s`."""
     square, new = _box_step(curve, box, s)
     for _ in range(ITERATIONS):
         step = new - s

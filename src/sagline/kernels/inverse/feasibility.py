@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Flags, Indices
-from sagline.kernels import codes, statics
+from sagline.kernels import codes, statics, tables
 from sagline.kernels.algebra.bounds import START, STRIP_ROWS
 from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable import geometry as g
@@ -23,9 +23,8 @@ from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
 
-SUPPORT = 1e-9  # smallest component of a cable that opposes the wrench, relative to the largest component of all cables
-AT_LIMIT = 1e-9  # relative to the limit; a tension with a smaller distance counts as at the limit
-PROVED, ENOUGH = 0, 1  # columns of the brackets
+SUPPORT = 1e-9  # least component of a cable along the proof that counts as limiting, relative to the largest component
+AT_LIMIT = 1e-9  # a tension counts as at its limit if their relative difference is smaller
 
 
 @entry
@@ -41,16 +40,16 @@ def decide_poses(
     answers: inverse.Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
-    """Check with chord tensions whether poses are feasible that the distribution iterations reported as infeasible.
+    """Decide with chord tensions whether poses are feasible that the distribution iterations reported as infeasible.
 
     The tensions of feasible poses are filled.
 
-    The arguments are those of `inverse_poses`, and:
+    The arguments are the same as in `inverse_poses`, and:
 
-    which: indices of the poses, (K,); covers: True if the method finds a distribution at every feasible pose. If False,
-    a feasible pose gets POSE_NOT_COVERED. verdicts: filled for these poses: lower and upper bound of the smallest
-    sufficient change of the force [N], (N, 2); this change along the free motions, (N, n), and Farkas vectors, (N, n),
-    both NaN if not found; True for each cable whose limit opposes the needed wrench, (N, m).
+    `which`: indices of the poses, (K,). `covers`: True if the method finds a distribution at every feasible pose. If
+    False, a feasible pose gets POSE_NOT_COVERED. `verdicts`: filled for the poses `which`: lower and upper bound [N] of
+    the least change of the force that makes the pose feasible, (N, 2); this change along the free motions, (N, n), and
+    Farkas vectors, (N, n), both NaN if not found; True for each cable whose limit opposes the needed wrench, (N, m).
     """
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
@@ -67,13 +66,13 @@ def decide_poses(
         model = inverse.model_at(model_terms, platform.body)
         statics.set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance)
         if cable_without_tension(cables) >= 0:
-            brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
+            brackets[p, tables.PROVED], brackets[p, tables.ENOUGH] = math.inf, math.inf
             for i in range(m):
                 blocking[p, i] = not cables.low[i] <= cables.high[i]
             continue
         demand, lever = demand_of_pose(platform, cables, balance, space, change)
         curves, left = new_curves(model, cables, statuses[p], rest)
-        status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide_feasibility(
+        status, brackets[p, tables.PROVED], brackets[p, tables.ENOUGH], proved = decide_feasibility(
             curves, demand, NODES, change, left
         )
         sag_forces_at(curves, change.tau, change.sag_force)
@@ -83,7 +82,7 @@ def decide_poses(
         if status == codes.POSE_SOLVED and not covers:
             status = codes.POSE_NOT_COVERED
         if status != codes.POSE_SOLVED and status != codes.POSE_INFEASIBLE and status != codes.POSE_BORDERLINE:
-            brackets[p, PROVED] = brackets[p, ENOUGH] = math.nan
+            brackets[p, tables.PROVED] = brackets[p, tables.ENOUGH] = math.nan
         if status == codes.POSE_SOLVED:
             inverse.measure_balance(platform, cables, balance, residuals[p])
             inverse.write_solution(True, model, cables, balance, results, p)
@@ -96,7 +95,7 @@ def decide_poses(
             for i in range(m):
                 supplied += demand.hanging[k, i] * change.sag_force[i]
             needed[p, k] = supplied if k < translations else supplied * lever
-            if status != codes.POSE_SOLVED and brackets[p, ENOUGH] < math.inf:
+            if status != codes.POSE_SOLVED and brackets[p, tables.ENOUGH] < math.inf:
                 reliefs[p, k] = change.residual[k] if k < translations else 0.0
         if status == codes.POSE_INFEASIBLE and proved:
             _write_proof(demand, change, lever, farkas[p])
@@ -106,9 +105,9 @@ def decide_poses(
 
 @glue
 def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[Demand, TensionChange, Array, Memory]:
-    """Work arrays for `m` cables and the free motions `freedom` (n, 6), root weights of one, and the remaining memory.
+    """Work arrays for `m` cables and the free motions `freedom` (n, 6), root weights equal to 1, and remaining memory.
 
-    The field `size` of the demand is not filled.
+    The field `size` of the demand remains unset.
     """
     n = freedom.shape[0]
     rows, memory = block(memory, 2 * n + 3, m)
@@ -123,7 +122,7 @@ def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[Demand, TensionC
 def demand_of_pose(
     platform: statics.Platform, cables: Cables, balance: statics.Balance, demand: Demand, change: TensionChange
 ) -> tuple[Demand, float]:
-    """Fill the demand of a pose on its cables, and the tensions at the start of the search.
+    """Fill the demand that a pose sets to its cables, and the initial tensions of the search.
 
     Returns the demand, and the lever arm [m] by which its moments are divided.
     """
@@ -162,7 +161,7 @@ def demand_of_pose(
 
 @glue
 def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Array) -> None:
-    """Fill the direction of the proof. Its force part, or its moment part if there is no force, has length 1."""
+    """Fill the direction `farkas` of the proof. The force part of `farkas`, or a pure moment, has length 1."""
     n = farkas.size
     for k in range(n):
         farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
@@ -198,11 +197,11 @@ def polygon_of_pose(
 ) -> int:
     """Fill the set of feasible tensions of one pose at fixed sag forces. Returns the number of corners of the set.
 
-    The arguments are those of `inverse_poses`, for one robot and one pose. Of the distribution only the variable is
-    used.
+    The arguments are the same as in `inverse_poses`, for one robot and one pose. From `distribution_terms`, only the
+    variable is used.
 
-    carried: chord tensions and sag forces of the cables, (m,) each. If they are NaN, first-order sag forces are used.
-    polygon: filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
+    `carried`: chord tensions and sag forces of the cables, (m,) each. For NaN, first-order sag forces are used.
+    `polygon`: filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
     space (r, m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval, corners[0,
     0] and corners[1, 0], which may be infinite.
     """

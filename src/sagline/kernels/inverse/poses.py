@@ -1,8 +1,8 @@
 """Inverse kinematics of a batch of poses: tensions that balance the platform, and unstrained lengths of the cables.
 
 docs/model.md, sections 4 and 5. For the exact cable, the sag forces T_z - tau sin phi depend on the tensions. The
-balance is therefore solved repeatedly with the last sag forces, until the sag forces converge. If the variable of the
-distribution is the frame-end tension, the balance is linearized at the last tensions.
+balance is therefore solved repeatedly, each time with the last sag forces, until the sag forces converge. If the
+variable of the distribution is the frame-end tension, the balance is linearized at the last tensions.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sagline.kernels.tension import nearest
 from sagline.kernels.tension.other_methods import distribute_by_other_method
 from sagline.kernels.tension.polygon import WorkArrays, new_work_arrays, reset_work_arrays
 
-TENSION_CONVERGED = 1e-9  # relative change of tension below which a distribution in frame-end tensions has converged
+TENSION_CONVERGED = 1e-9  # a distribution in frame-end tensions has converged below this relative change
 SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
 
 
@@ -44,7 +44,7 @@ def linearize_ends(model: Model, distribution: nearest.Distribution, cables: Cab
 
 
 ITERATIONS = 30
-# iterations after which the reference is fixed, so that rounding cannot change the choice between equal tensions
+# iterations before the reference is fixed; a fixed reference always selects the same of several optimal tensions
 FREE_ITERATIONS = 8
 CONVERGED = 1e-10  # largest change of a converged sag force, in N and relative to the largest tension:
 SAG_ROUNDING = 1e-15
@@ -57,9 +57,9 @@ def distribute_and_solve_cables(
 ) -> int:  # fmt: skip
     """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status.
 
-    cables: the cables from `set_pose`, with tensions, ratios and sag forces to be filled; work: work arrays for
-    frame-end tensions and for methods that are not projections. With None, the code of both is not compiled. statuses:
-    filled with the status of each cable, (m,).
+    `cables`: the cables from `set_pose`, with tensions, ratios and sag forces to be filled. `work`: work arrays for
+    frame-end tensions and for methods that are not projections; if None, this code is not compiled. `statuses`: filled
+    with the status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if work is not None:
@@ -108,14 +108,14 @@ def distribute_and_solve_cables(
             reset_work_arrays(work)
         solved = True
         statics.fill_needed_wrench(platform, cables, balance)
-    if status == codes.POSE_SOLVED and not strain_admits_tensions(cables):
+    if status == codes.POSE_SOLVED and not _strain_admits_tensions(cables):
         status = codes.POSE_INFEASIBLE
     return status
 
 
 @glue
-def strain_admits_tensions(cables: Cables) -> bool:
-    """True if no cable without upper limit exceeds the largest strain, which distribution methods ignore."""
+def _strain_admits_tensions(cables: Cables) -> bool:
+    """True if no cable without upper limit exceeds the largest strain. The distribution methods ignore this strain."""
     for i in range(cables.tau.size):
         if cables.tau[i] > cables.high[i] and states.is_limited_by_strain(cables, i):
             return False
@@ -124,7 +124,7 @@ def strain_admits_tensions(cables: Cables) -> bool:
 
 @glue
 def fix_reference(balance: statics.Balance, near: nearest.ReferencePoint) -> None:
-    """Make the present tensions the reference, and release an active bound that is only due to a tie."""
+    """Set the present tensions as the reference, and release active bounds that only selected among equal optima."""
     near.held.labels[0] = 0
     for k in range(balance.null.shape[0]):
         near.reference[k] = 0.0
@@ -156,7 +156,7 @@ def sag_force_change(cables: Cables) -> float:
 
 
 @glue
-def store_tensions(
+def _store_tensions(
     model: Model,
     distribution: nearest.Distribution,
     cables: Cables,
@@ -186,7 +186,7 @@ Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residua
 
 @glue
 def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> statics.Platform:
-    """Platform at pose `p`. Robots and wrenches have a single row for all poses, or one row per pose."""
+    """Platform at pose `p`. `robots` and `wrenches` have one row for all poses, or one row per pose."""
     freedom, bodies, cables = robots
     body, cable_rows = bodies[min(p, bodies.shape[0] - 1)], cables[min(p, cables.shape[0] - 1)]
     return statics.Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
@@ -214,7 +214,7 @@ def inverse_poses(
     first: int,
     last: int,
 ) -> None:
-    """Solve part of a batch, pose by pose. With CLOSEST, each feasible pose gives the next reference tensions.
+    """Solve part of a batch, pose by pose. With CLOSEST, the tensions of each feasible pose are the next reference.
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
@@ -225,10 +225,10 @@ def inverse_poses(
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
         previous: Reference tensions in the distribution's variable (m,), NaN for the minimum norm. CLOSEST overwrites
-            them with the tensions of the last feasible pose.
+            `previous` with the tensions of the last feasible pose.
         memory: Work arrays from `memory_for`, for the number of cables.
-        otherwise: True for any method. None if the method is a projection onto a reference in chord or horizontal
-            tensions; the code of all other methods is then not compiled.
+        otherwise: True for any method. None if the method is a projection in chord or horizontal tensions; the code of
+            all other methods is then not compiled.
         stability: True to prove the stability of each equilibrium. A solved pose without a proof then gets
             UNPROVED_STABILITY. With None, the proof is not compiled.
         answers: Filled with span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and then
@@ -264,7 +264,7 @@ def inverse_poses(
         if status == codes.POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
             if distribution.method == codes.CLOSEST:
-                store_tensions(model, distribution, cables, others, near)
+                _store_tensions(model, distribution, cables, others, near)
         else:
             residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
         for k in range(n):
@@ -282,7 +282,7 @@ def inverse_poses(
 def measure_balance(platform: statics.Platform, cables: Cables, balance: statics.Balance, residuals: Array) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the platform's free motions."""
     statics.fill_needed_wrench(platform, cables, balance)
-    rest = balance.needed  # work memory, because `balance.right` contains its components
+    rest = balance.needed  # `needed` serves as work memory here, because `balance.right` still contains its components
     for k in range(balance.right.size):
         rest[k] = -balance.right[k]
         for i in range(cables.tau.size):
@@ -296,7 +296,7 @@ def measure_balance(platform: statics.Platform, cables: Cables, balance: statics
 def write_solution(
     solved: bool, model: Model, cables: Cables, balance: statics.Balance, results: Array, p: int
 ) -> None:
-    """Write the results of pose `p`. If it has no solution, all rows except span and rise become NaN."""
+    """Write the results of pose `p`. If `solved` is false, all rows except span and rise become NaN."""
     for i in range(cables.tau.size):
         tension = cables.tau[i] if solved else math.nan
         results[tables.SPAN, p, i] = balance.geometry[g.SPAN, i]
@@ -317,7 +317,7 @@ def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p:
         results[tables.WRAP, p] = results[tables.WRAPPED, p] = math.nan
         results[tables.DEAD, p] = results[tables.SINE, p] = math.nan
         return
-    # memory for the exit points of the cables, because the previous sag forces are no longer needed
+    # the memory of the previous sag forces, which are no longer needed, takes the exit points
     tension = cables.last_sag_force
     copy(cables.tau, tension)
     if model.code == codes.CATENARY:

@@ -1,4 +1,4 @@
-"""Proof of the stability of a solved pose, from values of its solution; docs/model.md, section 6.
+"""Proof that the equilibrium of a solved pose is stable, from values of its solution; docs/model.md, section 6.
 
 The stiffness of a platform end is positive definite. Let u be the unit vector along the chord and c the compliance
 along u. The stiffness is then at least u u^T/c. With any right inverse A of the structure matrix J, the inverse of J
@@ -22,14 +22,14 @@ from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import Balance, Platform
 
-ROUNDING = 0.01  # a proof with a smaller margin is not valid
+ROUNDING = 0.01  # a proof with a smaller margin is rejected, because of rounding errors
 
 
 class StabilityArrays(NamedTuple):
     """Work arrays of the proof, for `m` cables and `k` free rotations."""
 
     compliance: Array  # compliance of the platform ends along their chords [m/N], (m,)
-    torque: Array  # sum of r T^T, T the force on a cable at its platform end [N m], (3, 3)
+    torque: Array  # sum over cables of r T^T [N m], (3, 3); r: lever, T: force on a cable at its platform end
     geometric: Array  # geometric stiffness of the rotations [N m], (k, k)
     elastic: Array  # upper bound of the compliance of the rotations [1/(N m)], overwritten by its factor L, (k, k)
     proof: Array  # the matrices G L and 1 + L^T G L, one below the other, (2 k, k)
@@ -46,7 +46,7 @@ def new_stability_arrays(memory: Memory, m: int, k: int) -> tuple[StabilityArray
 
 @glue
 def proves_stability(model: Model, platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays) -> bool:
-    """True if it is proved that the equilibrium of a solved pose is stable."""
+    """True if the work arrays prove that the equilibrium of a solved pose is stable. False if the proof fails."""
     k = work.geometric.shape[0]
     if model.code != codes.CATENARY and model.code != codes.ELASTIC:
         return False
@@ -67,7 +67,8 @@ def proves_stability(model: Model, platform: Platform, cables: Cables, balance: 
         arm = 0.0
         for j in range(k):
             arm += balance.inverse[first + j, i] * balance.inverse[first + j, i]
-        trace += work.compliance[i] * arm / (balance.scale[i] * balance.scale[i])
+        work.compliance[i] /= balance.scale[i] * balance.scale[i]  # `inverse` is that of the scaled matrix
+        trace += work.compliance[i] * arm
     if trace * -least <= 1.0 - ROUNDING:
         return True
     return _compares_all_rotations(balance, work)
@@ -110,7 +111,7 @@ def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balan
 def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
     """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N].
 
-    They are exact without pulleys, and infinite for deep sag, which is outside the range of the polynomial.
+    Without pulleys, the bounds are exact. For deep sag, beyond the range of the polynomial, the bounds are infinite.
     """
     for i in range(cables.tau.size):
         length = cables.ratio[i] * cables.free_chord[i]
@@ -136,7 +137,7 @@ def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
             x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + cables.sag_force[i]
             za = z - weight * length
             at_frame = math.sqrt(x * x + za * za)
-            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], math.pi)  # the largest angle
+            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], math.pi)  # psi at its largest value
             strained = 1.0 + at_frame / cables.stiffness[i]
             soft = strained * softness(pulley_of(cables, i), weight, cables.stiffness[i], at_frame, wrap)
             compliance[i] += strained * soft / (1.0 + weight * za / at_frame * soft)
@@ -152,8 +153,7 @@ def _compares_all_rotations(balance: Balance, work: StabilityArrays) -> bool:
         for i in range(j + 1):
             total = 0.0
             for c in range(work.compliance.size):
-                arms = balance.inverse[first + j, c] * balance.inverse[first + i, c]
-                total += work.compliance[c] * arms / (balance.scale[c] * balance.scale[c])
+                total += work.compliance[c] * balance.inverse[first + j, c] * balance.inverse[first + i, c]
             factor[j, i] = total
     if not factor_positive(factor, 0.0, factor):
         return False

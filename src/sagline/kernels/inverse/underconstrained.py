@@ -1,9 +1,9 @@
 """Equilibria of platforms with fewer cables than degrees of freedom; docs/model.md, section 5.
 
-As many values as cables are given: coordinates of the platform, and possibly a tension level. The remaining motions and
-the chord tensions follow from the balance by Newton steps. The tensions, not the lengths, are the unknowns, because a
-length change of a millimeter can change a tension by more than the tension itself. The steps neglect the second-order
-terms of the sag in the derivatives, but not in the balance.
+As many values are given as there are cables. The given values are coordinates of the platform, and possibly a tension
+level. The remaining motions and the chord tensions follow from the balance by Newton steps. The tensions, not the
+lengths, are the unknowns, because a length change of a millimeter can change a tension by more than the tension itself.
+In the derivatives, the steps neglect the second-order terms of the sag. The balance includes them.
 """
 
 from __future__ import annotations
@@ -23,18 +23,15 @@ from sagline.kernels.inverse import poses as inverse
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block, counters, vector
 
-# Codes of the given values: 0, 1 and 2 are the coordinates of the platform origin.
-YAW, LEVEL = 3, 4
-
 STEPS = 60  # largest number of steps; taut cables need 4 to 10
-CONVERGED = 1e-10  # last step: turn [rad], displacement relative to the lever arm, and relative change of the tensions
+CONVERGED = 1e-10  # last step: turn [rad], displacement relative to the lever arm, relative change of the tensions
 TURN = 0.3  # largest turn per step [rad]
 SHRINK = 0.2  # smallest ratio of a tension to its value before the step
 FLOOR = 0.02  # smallest initial tension, relative to the mean load of a cable
 RIDGE = 1e-6  # relative regularization of the initial tensions
-PATIENCE = 5  # consecutive steps at a smallest tension after which no equilibrium has a larger one
+PATIENCE = 5  # after this number of consecutive steps at a smallest tension, the search ends without an equilibrium
 ITERATIONS = 12  # inverse iterations for the tension level; each reduces the error by the ratio of two eigenvalues
-WITHIN = 1e-9  # relative violation of a limit that is rounding
+WITHIN = 1e-9  # relative violation of a limit that counts as rounding error
 
 
 class UnderconstrainedArrays(NamedTuple):
@@ -42,7 +39,7 @@ class UnderconstrainedArrays(NamedTuple):
 
     jacobian: Array  # derivatives of balance and given values with respect to motion and tensions, (n + m, n + m)
     step: Array  # residuals, then the step, (n + m,)
-    stiffness: Array  # derivative of the cables' wrench with respect to the motion, constant tensions, (6, 6)
+    stiffness: Array  # derivative of the cables' wrench with respect to the motion, at constant tensions, (6, 6)
     along: Array  # unit vector of the tension level, (m,)
     sag_force: Array  # sag forces [N], (m,)
     gram: Array  # J^T J (m, m), then a work row
@@ -57,7 +54,7 @@ class _Search(NamedTuple):
     """Search for the equilibrium of one pose."""
 
     limits: TensionLimits
-    platform: statics.Platform  # its pose has the given values
+    platform: statics.Platform  # platform at the pose with the given values
     curves: Curves
     balance: statics.Balance
     level: float  # tension level [N]
@@ -67,7 +64,7 @@ class _Search(NamedTuple):
 
 
 @glue
-def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[UnderconstrainedArrays, Memory]:
+def _new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[UnderconstrainedArrays, Memory]:
     """Work arrays, and the remaining memory."""
     jacobian, memory = block(memory, n + m, n + m)
     step, memory = vector(memory, n + m)
@@ -85,7 +82,7 @@ def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[Underco
 
 @glue
 def _mean_lever(geometry: Array) -> float:
-    """Root mean square distance of the platform ends from the center of mass. 1 m if all ends are at this center."""
+    """Root mean square distance of the platform ends from the center of mass [m]; 1 if all ends are at this center."""
     square = 0.0
     for i in range(geometry.shape[1]):
         x, y, z = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
@@ -95,7 +92,7 @@ def _mean_lever(geometry: Array) -> float:
 
 @glue
 def _fill_gram(freedom: Array, matrix: Array, lever: float, gram: Array) -> None:
-    """Fill J^T J (m, m), with moments divided by the lever arm and a ridge on the diagonal."""
+    """Fill J^T J (m, m) with moments divided by `lever`, and a small number (ridge) added to the diagonal."""
     m = gram.shape[0]
     trace = 0.0
     for i in range(m):
@@ -111,11 +108,11 @@ def _fill_gram(freedom: Array, matrix: Array, lever: float, gram: Array) -> None
 
 @glue
 def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
-    """Fill the unit vector (m,) of the tensions with the smallest wrench. The first large entry is positive."""
+    """Fill the unit vector (m,) of the tensions with the smallest wrench, with a positive first large entry."""
     m = along.size
     for i in range(m):
         along[i] = (1.0 + 0.1 * i) * (1.0 if i % 2 == 0 else -1.0)
-    for _ in range(ITERATIONS):  # the vector grows by at most 1/RIDGE in each
+    for _ in range(ITERATIONS):  # the vector grows by at most the factor 1/RIDGE in each iteration
         for i in range(m):
             copy(gram[i], work[i])
         solve_general(work, along)
@@ -163,7 +160,7 @@ def _fill_stiffness(cables: Cables, geometry: Array, stiffness: Array) -> None:
             mz = 1.0 if b == 2 else y if b == 3 else -x if b == 4 else 0.0
             near = ux * mx + uy * my + uz * mz
             dx, dy, dz = scale * (ux * near - mx), scale * (uy * near - my), scale * (uz * near - mz) + weight * near
-            turn = 1.0 if b >= 3 else 0.0  # the lever arm turns, too
+            turn = 1.0 if b >= 3 else 0.0  # the rotation also turns the lever arm
             stiffness[0, b] += dx
             stiffness[1, b] += dy
             stiffness[2, b] += dz
@@ -193,13 +190,13 @@ def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
     wanted = statics.turned(start, 1.0, 0.0, 0.0)
     for c in range(m):
         for i in range(m):
-            jacobian[n + c, n + i] = space.along[i] if given[c] == LEVEL else 0.0
+            jacobian[n + c, n + i] = space.along[i] if given[c] == codes.LEVEL else 0.0
         space.motion[:] = 0.0
-        if given[c] == LEVEL:
+        if given[c] == codes.LEVEL:
             step[n + c] = level
             for i in range(m):
                 step[n + c] -= space.along[i] * cables.tau[i]
-        elif given[c] == YAW:
+        elif given[c] == codes.YAW:
             level_square = forward[0] * forward[0] + forward[1] * forward[1]
             space.motion[3] = -forward[0] * forward[2] / level_square
             space.motion[4] = -forward[1] * forward[2] / level_square
@@ -249,8 +246,7 @@ def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, b
 def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
     """Take Newton steps until the balance holds. Returns POSE_SOLVED or the failure.
 
-    The pose of the search and the tensions of the work arrays are the initial values. They are replaced by the last
-    values.
+    The pose of `search` and the tensions of `space` contain the initial values, and at the end the last values.
     """
     model, cables, tau = search.curves.model, search.curves.cables, space.tau
     status = codes.POSE_NO_EQUILIBRIUM
@@ -260,7 +256,7 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
             break
         sag_forces_at(search.curves, tau, space.sag_force)
         statics.fill_needed_wrench(search.platform, cables, search.balance)
-        if status == codes.POSE_SOLVED:  # the cables are those of the last step
+        if status == codes.POSE_SOLVED:  # the arrays of the cables belong to the last step
             break
         _fill_system(search, space)
         if not solve_general(space.jacobian, space.step):
@@ -299,13 +295,13 @@ def underconstrained_poses(
 ) -> None:
     """Solve part of a batch of platforms with fewer cables than degrees of freedom.
 
-    The arguments are those of `inverse_poses` with m < n, and:
+    The arguments are the same as in `inverse_poses`, with m < n, and:
 
-    starts: rows with the given coordinates, (N, POSE_COLUMNS); the others are initial values. given: codes of the given
-    values, (m,): 0, 1 and 2 for coordinates of the origin, YAW, LEVEL. level: tension level [N], the component of the
-    chord tensions along the unit vector of tensions whose wrench at the initial pose is smallest. chained: True to
-    start each pose at the rotation and the tensions of the pose before. poses: filled with the poses; the given pose
-    without a solution. blocking: filled: True for cables whose limits the equilibrium violates, (N, m).
+    `starts`: rows with the given coordinates, (N, POSE_COLUMNS); their other coordinates are initial values. `given`:
+    codes of the given values, (m,): 0, 1 and 2 for coordinates of the origin, YAW, LEVEL. `level`: tension level [N],
+    component of the chord tensions along a unit vector: the tensions with the smallest wrench at the initial pose.
+    `chained`: True to start each pose at rotation and tensions of the previous pose. `poses`: filled with the
+    poses; a pose without a solution is the start. `blocking`: filled, (N, m): cables with violated limits.
     """
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
@@ -313,12 +309,12 @@ def underconstrained_poses(
     m, n = statuses.shape[1], freedom.shape[0]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = statics.new_balance(rest, m, n)
-    space, rest = new_underconstrained_arrays(rest, m, n)
-    # Without a level, the tensions must turn the platform to its yaw. The search starts at the answer for level 0.
+    space, rest = _new_underconstrained_arrays(rest, m, n)
+    # Without a level, the tensions must turn the platform to its yaw. The search starts at the solution for level 0.
     has_yaw = has_level = False
     for i in range(m):
-        has_yaw = has_yaw or given[i] == YAW
-        has_level = has_level or given[i] == LEVEL
+        has_yaw = has_yaw or given[i] == codes.YAW
+        has_level = has_level or given[i] == codes.LEVEL
     turned_by_tensions = has_yaw and not has_level
     for p in range(first, last):
         platform = inverse.platform_at(robot_terms, starts, wrenches, p)
@@ -345,7 +341,7 @@ def underconstrained_poses(
             for stage in range(0 if turned_by_tensions else 1, 2):
                 if status == codes.POSE_SOLVED:
                     for i in range(m):
-                        space.given[i] = LEVEL if stage == 0 and given[i] == YAW else given[i]
+                        space.given[i] = codes.LEVEL if stage == 0 and given[i] == codes.YAW else given[i]
                     status = _find_equilibrium(search, space)
         solved = status == codes.POSE_SOLVED
         if solved:

@@ -1,12 +1,12 @@
 """Feasibility of a wrench with tensions within their limits, decided with the exact sag forces of the cables.
 
-Tensions that balance the wrench prove its feasibility. A direction y can prove that the wrench is infeasible: along y,
+Tensions that balance the wrench prove its feasibility. A direction y can prove that the wrench is infeasible. Along y,
 the contribution of each cable has a largest value. If the sum of these values is less than the demand, no tensions
-balance the wrench. Otherwise the contribution of a cable cannot be far below its largest value, which narrows the range
-of its tension. If the ranges do not become narrower, the range with the most uncertain sag force is split in two.
+balance the wrench. If the sum is larger, each contribution must be close to its largest value, which narrows the
+tension range. If the ranges do not become narrower, the range with the most uncertain sag force is split in two.
 
-The gap between the demand and the sum in the first proof is a lower bound of the shortfall. The residual of the least
-change of the wrench is an upper bound.
+The shortfall has two bounds. The lower bound is the demand minus this sum in the first proof. The upper bound is the
+residual of the least change of the wrench.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
 
-PLENTY = 1e6  # upper end of the tensions of a cable without limit, relative to the largest force
-FEASIBLE = 1e-9  # relative to the largest force; a smaller residual of the balance counts as zero
-CERTAIN = 1e-14  # relative to the terms of the sum; a smaller gap may be a rounding error
-NODES = 300  # number of examined ranges; after this number the search ends without a result
+PLENTY = 1e6  # largest tension of a cable without limit, relative to the largest force
+FEASIBLE = 1e-9  # a residual of the balance below this share of the largest force counts as zero
+CERTAIN = 1e-14  # a gap below this share of the terms of the sum may be a rounding error
+NODES = 300  # largest number of examined ranges; then the search ends without a result
 DEPTH = 40  # largest number of waiting ranges
-STANDSTILL = 0.7  # a range is split if narrowing leaves more than this share of its uncertainty
+STANDSTILL = 0.7  # a range is split if more than this share of its uncertainty remains after narrowing
 
 # Rows of a range (RANGE_ROWS, m): least and largest tensions, and the sag forces at them.
 LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3
@@ -50,7 +50,7 @@ def component_along(columns: Array, direction: Array, i: int) -> float:
 
 @kernel
 def _spare_capacity(curves: sag_forces.Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
-    """Capacity of the cables along `direction`, minus the demand [N]. A negative value proves infeasibility.
+    """Largest force [N] of the cables along `direction`, minus the demand. A negative value proves infeasibility.
 
     The value is an upper bound that includes rounding errors. tops: filled with the largest contribution of each cable,
     (m,).
@@ -99,7 +99,7 @@ def _narrow_range(
 def _narrow_free(
     curves: sag_forces.Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
 ) -> bool:
-    """Narrow a range along directions in which, of the cables that are not at a limit, only one contributes.
+    """Narrow a range along directions to which only one of the cables between their limits contributes.
 
     Returns False if the range becomes empty.
     """
@@ -150,7 +150,7 @@ def _least_certain(curves: sag_forces.Curves, range_: Array) -> tuple[int, float
 
 @glue
 def _split_range(curves: sag_forces.Curves, waiting: Array, top: int, i: int, tau: float) -> None:
-    """Split the tension range of cable `i` in two. The half with the present tension is examined next."""
+    """Split the tension range of cable `i` in two. The half that contains the tension `tau` is examined next."""
     for row in range(RANGE_ROWS):
         for j in range(waiting.shape[2]):
             waiting[top + 1, row, j] = waiting[top, row, j]
@@ -166,7 +166,7 @@ def _split_range(curves: sag_forces.Curves, waiting: Array, top: int, i: int, ta
 
 @glue
 def _first_range(curves: sag_forces.Curves, size: float, range_: Array) -> None:
-    """Fill the first range: all admissible tensions. Its upper end is always finite, also without a limit."""
+    """Fill the first range with all admissible tensions. The upper end is finite, even for a cable without a limit."""
     cables = curves.cables
     for i in range(cables.low.size):
         low, high = cables.low[i], cables.high[i]
@@ -207,12 +207,12 @@ def _approach_demand(
 def decide_feasibility(
     curves: sag_forces.Curves, demand: Demand, nodes: int, change: TensionChange, memory: Memory
 ) -> tuple[int, float, float, bool]:
-    """Feasibility of `demand` with tensions within the cables' limits.
+    """Decide whether tensions within the cables' limits can supply `demand`.
 
-    nodes: largest number of examined ranges; change: initial tensions, overwritten with the tensions of least residual,
-    this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after
-    an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if a single direction proves
-    infeasibility for the whole first range.
+    `nodes`: largest number of examined ranges. `change`: initial tensions, overwritten with the tensions with the least
+    residual, this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or
+    POSE_NOT_CONVERGED after an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if a single
+    direction proves infeasibility for the whole first range.
     """
     n, m = demand.matrix.shape
     tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]

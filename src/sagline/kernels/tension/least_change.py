@@ -1,8 +1,8 @@
-"""Least change that makes a wrench feasible with tensions within their limits and with the exact sag forces.
+"""Least change of a wrench that makes it feasible, with tensions within their limits and exact sag forces.
 
 The wrench of cable i on the platform is the curve J_i tau - G_i s_i(tau) with the sag force s_i. Newton steps replace
-the curves by their tangents. Each step is a least-squares problem within limits. The moments are hard equations, so
-that the residual is only a force. A small weight on the change of the tensions makes the solution unique.
+the curves by their tangents. Each step is a least-squares problem within limits. The moments must balance exactly (hard
+rows), so that the residual is only a force. A small weight on the change of the tensions makes the solution unique.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from sagline.kernels.memory import Memory, block, vector
 NEWTON_STEPS = 40
 HALVINGS = 12
 STEADINESS = 1e-8  # weight of the squared change of a tension, relative to the weight of the squared wrench
-DECREASE = 1e-4  # share of the predicted decrease that a step must reach
+DECREASE = 1e-4  # a step must reach this share of its predicted decrease
 STIFFEST = 1e3  # largest weight of a curvature; a larger weight would make the normal matrix ill-conditioned
-STANDS = 1e-13  # relative to the largest force; the search ends if the predicted decrease is smaller
-# relative to the residual; a smaller change of the tensions does not change the direction of the residual
+STANDS = 1e-13  # the search ends if the predicted decrease is below this share of the largest force
+# tensions that change less, relative to the residual, do not change the direction of the residual
 STEADY = 1e-6
 
 
 class Demand(NamedTuple):
-    """Demand on the cables of one pose; moments are divided by the lever arm, so that every row is in newtons."""
+    """Demand on the cables of one pose. Moments are divided by the lever arm, so that every row is in newtons."""
 
     matrix: Array  # J, wrench per chord tension, (n, m)
     hanging: Array  # G, wrench per sag force, which is subtracted, (n, m)
     right: Array  # wrench that the cables must supply, without sag forces, (n,)
-    soft: int  # number of soft rows, which come first; the other rows are hard
+    soft: int  # number of soft rows, which are the first rows; the other rows are hard
     size: float  # largest force [N], the reference of tolerances
 
 
@@ -69,7 +69,7 @@ class _Tangents(NamedTuple):
 
 @glue
 def _new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[_Tangents, Memory]:
-    """Work arrays for a step with the given number of hard rows, and the remaining memory."""
+    """Work arrays for a step with `hard` hard rows, and the remaining memory."""
     d = m - hard
     matrix, memory = block(memory, n, m)
     reduced, memory = block(memory, hard, m)
@@ -117,7 +117,7 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
     """Fill the tangents at `tau`, and the normal matrix. False if the hard rows are linearly dependent.
 
     The normal matrix includes the second derivatives of the curves, times the multipliers (n,) of the previous step, if
-    they make the matrix more positive definite. Steps without the curvature would oscillate about the minimum.
+    they make the matrix more positive definite. Without them, steps would oscillate.
     """
     n, m = step.matrix.shape
     soft = demand.soft
@@ -153,7 +153,7 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
 
 @glue
 def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tangents) -> bool:
-    """Fill tensions of a full step and multipliers of the limits. False if hard rows and limits are contradictory."""
+    """Fill tensions after a full step and multipliers of the limits. False if hard rows contradict the limits."""
     n, m = step.matrix.shape
     soft = demand.soft
     hard = n - soft
@@ -203,7 +203,7 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
 
 @glue
 def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
-    """Fill the direction of the step's residual. The soft rows of the direction have length 1.
+    """Fill the direction of the residual after a full step. The soft rows of the direction have length 1.
 
     Returns the length of the soft rows before this scaling [N].
 
@@ -233,10 +233,10 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Halve a step until it gives the required decrease. False if no step does, or if the result is worse.
+    """Halve a step until it gives the required decrease. False if no step does so, or if the result is worse.
 
-    The weight of the hard residual exceeds the multipliers of the hard rows. A step therefore cannot decrease the soft
-    residual by an increase of the hard residual.
+    The weight of the hard residual exceeds the multipliers of the hard rows. A larger hard residual is therefore never
+    accepted in exchange for a smaller soft residual.
     """
     n, m = demand.matrix.shape
     soft = demand.soft
@@ -276,8 +276,8 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionC
     """Change tensions within their ranges until the residual of the demand is least. Returns its length [N].
 
     ranges: least and largest tensions, rows 0 and 1; change: start of the search, overwritten with the result. The
-    returned length is that of the soft residual [N]. It is infinite if hard rows and ranges contradict each other on
-    the tangents, and NaN if the hard rows are linearly dependent.
+        returned length [N] is the length of the soft residual: infinite if the tangents of the hard rows contradict the
+        ranges, and NaN if the hard rows are linearly dependent.
     """
     n, m = demand.matrix.shape
     soft = demand.soft

@@ -1,8 +1,8 @@
 """Capacity margin of a pose: distance to the faces of the available wrench set.
 
-The wrenches of all tensions within their limits form a zonotope. Each of its faces is parallel to n - 1 columns of the
-structure matrix. The force part of a face normal has length 1. The distance to a face is then the smallest extra force
-that reaches the face.
+The wrenches of all tensions within their limits form a zonotope. Each face of the zonotope is parallel to n - 1 columns
+of the structure matrix. The force part of a face normal has length 1. With this scale, the distance to a face is the
+smallest extra force that reaches the face.
 
 Source:
     Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of
@@ -20,14 +20,14 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 MOST_FACES = 1 << 40  # largest number of passes of the loop, which is never reached
-ALONG = 1e-13  # a column lies in the face if its component along the unit normal is smaller
-# a column counts as dependent on the others if the share of its squared length outside their span is smaller
+ALONG = 1e-13  # a column with a smaller component along the unit normal lies in the face
+# least share of a column's squared length outside the span of the others
 DEPENDENT = 1e-20
 
 
 @glue
 def next_choice(chosen: Indices, m: int) -> int:
-    """Replace the combination `chosen` by the next. Returns the first changed position, or -1 after the last."""
+    """Replace the combination `chosen` by the next one. Returns the first changed position, or -1 after the last."""
     count = chosen.size
     place = -1
     for k in range(count):
@@ -42,9 +42,9 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 @glue
 def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
-    """Add the columns `chosen`, from the position `first` on, to the frame (n, n). Returns the frame's number of rows.
+    """Add the columns `chosen[first:]` to the frame (n, n). Returns the number of rows of the frame.
 
-    The number is smaller than the number of columns if a column depends on the columns before it.
+    A column that depends linearly on the columns before it adds no row.
     """
     n = matrix.shape[0]
     held = first
@@ -80,7 +80,7 @@ def complete_frame(frame: Array, triangle: Array) -> None:
 
 @formula
 def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
-    """Largest values of normal . J t and of -normal . J t for all tensions t within their limits. May be infinite."""
+    """Largest values of normal . J t and of -normal . J t over all tensions t within their limits; may be infinite."""
     n, m = matrix.shape
     forward = 0.0
     backward = 0.0

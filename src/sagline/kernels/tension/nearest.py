@@ -1,9 +1,9 @@
 """Nearest distributions and least norms: minimum norm, closest tensions, quadratic program, sum, maximum, p-norm.
 
 docs/model.md, section 5. Objective (55) of the article selects the tensions closest to given tensions t_ref. In
-coordinates of an orthonormal null-space basis N, these tensions are the projection of lambda_ref = N^T (t_ref - t0)
-onto the feasible set. The distribution of minimum norm is the projection of 0. Sum and maximum are linear programs. A
-p-norm is minimized by Newton steps, each projected onto the feasible set with distances in the metric of the step.
+coordinates of an orthonormal null-space basis N, the selected tensions are the projection of lambda_ref = N^T (t_ref -
+t0) onto the feasible set. The distribution of minimum norm is the projection of 0. Sum and maximum are linear programs.
+A p-norm is minimized by Newton steps, each projected onto the feasible set with distances in the metric of the step.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[Refere
 def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
     """Fill the reference point of `distribution` in the null space.
 
-    offset: offset of the distribution's variable (m,).
+    `offset`: offset of the distribution's variable (m,).
     """
     from_before = distribution.method == codes.CLOSEST and not math.isnan(near.previous[0])
     for k in range(null.shape[0]):
@@ -111,7 +111,7 @@ def is_nearest(distribution: Distribution) -> bool:
     return distribution.method <= codes.QUADRATIC_PROGRAM
 
 
-TIED = 1e-10  # relative; sums with a smaller difference count as equal, and smaller weights count as zero
+TIED = 1e-10  # sums with a smaller relative difference count as equal; a smaller relative weight counts as zero
 
 
 @formula
@@ -126,7 +126,7 @@ def program_status(outcome: int) -> int:
 
 @formula
 def _is_tied(basis: Basis) -> bool:
-    """True if a program has more than one optimum: an active bound with zero multiplier."""
+    """True if a linear program has more than one optimum, which means that an active bound has a multiplier of zero."""
     largest = 0.0
     least = math.inf
     for j in range(basis.weights.size - 1):
@@ -177,7 +177,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of `near` with the least maximum tension. Among several points: the nearest to the reference.
+    """Fill the point (r,) of `near` with the least maximum tension; of several points, the nearest to the reference.
 
     The program's last unknown is the largest tension.
     """
@@ -221,8 +221,8 @@ def share_lowest_maximum(
 
 STEPS = 200
 HALVINGS = 40
-CLOSE = 1e-2  # relative to the largest tension; the exponent is increased after a shorter step
-STILL = 1e-12  # relative to the largest tension; the search ends after a shorter step
+CLOSE = 1e-2  # the exponent is increased after a step below this share of the largest tension
+STILL = 1e-12  # the search ends after a step below this share of the largest tension
 
 
 @kernel
@@ -231,7 +231,7 @@ def share_by_norm(
 ) -> int:
     """Fill the point (r,) of `near` whose tensions have the least p-norm.
 
-    known: True if the point is the result of the previous iteration, (1,); the search then starts at this point.
+    `known`: (1,); if True, the point is the result of the previous iteration, and the search starts at this point.
     """
     point = near.point
     slack = TOLERANCE * largest_bound(bounds)
@@ -274,9 +274,9 @@ def _p_norm_power(bounds: Array, offset: Array, null: Array, point: Array, p: fl
 def _newton_target(
     bounds: Array, offset: Array, null: Array, point: Array, p: float, slope: Array, curve: Array, target: Array
 ) -> float:
-    """Fill slope, Cholesky factor of the curvature, and the end point of a Newton step without limits.
+    """Fill slope, Cholesky factor of the curvature, and end point of a Newton step that ignores the limits.
 
-    Returns the largest tension [N], which is the unit of slope and curvature. If it is 0, no step is needed.
+    Returns the largest tension [N], which is the unit of slope and curvature. A result of 0 means: no step is needed.
     """
     r, m = null.shape
     scale = 0.0
@@ -308,7 +308,7 @@ def _newton_target(
 
 @glue
 def _change_metric(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -> None:
-    """Fill null space (r, m) and target (r,) in coordinates in which the metric L L^T becomes Euclidean."""
+    """Convert null space (r, m) and target (r,) to coordinates in which the metric L L^T is Euclidean."""
     r, m = null.shape
     for k in range(r):
         goal[k] = 0.0
@@ -329,8 +329,8 @@ def _lowest_p_norm(
 ) -> bool:
     """Move the feasible point (r,) of `near` to the point of least p-norm. Returns True if this point was found.
 
-    The exponent starts small and doubles whenever the steps become short, until it is p. Each Newton iteration thus
-    starts near its solution.
+    The exponent starts small. The exponent doubles whenever the steps become short, until it is p. Each Newton
+    iteration thus starts near its solution.
 
     The result is False if the iteration does not converge.
     """

@@ -33,7 +33,7 @@ PARALLEL = 1e-12
 
 @kernel
 def _limit_lines(bounds: Array, null: Array, lines: Array) -> None:
-    """Fill rows (gx, gy, offset), (2m, 3): limits 2i and 2i + 1 are gx x + gy y + offset >= 0."""
+    """Fill rows (gx, gy, offset), (2m, 3). Rows 2i and 2i + 1 are the limits gx x + gy y + offset >= 0 of cable i."""
     for i in range(null.shape[1]):
         lines[2 * i, 0] = null[0, i]
         lines[2 * i, 1] = null[1, i]
@@ -68,10 +68,10 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     slack = TOLERANCE * largest_bound(bounds)
     lines, memory = block(memory, 2 * m, 3)
     _limit_lines(bounds, null, lines)
-    met, memory = counters(memory, 2 * m)  # 1 for an included limit
+    met, memory = counters(memory, 2 * m)  # entry 1: the walk includes this limit
     a, b = most_independent(null)
     line = 2 * a
-    # start: the corner at which line a begins; it runs counter-clockwise, with the inside on its left
+    # start: the corner at which line a begins; the line runs counter-clockwise, with the inside on its left
     other = 2 * b
     cross = lines[line, 0] * lines[other, 1] - lines[line, 1] * lines[other, 0]
     if cross > 0.0:
@@ -120,21 +120,20 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
                 if lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack:
                     met[k] = 1
             met[turn] = 1
-            # the border of this limit ends here, where the walk continues; it is the last side of the walk
+            # the walk leaves this border here; a full turn will end with it, as the last side
             first_line = line
             count = 0
     return -1
 
 
-TIED = 1e-10  # relative to the largest tension: sums that differ by less count as equal
-WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon walk
+TIED = 1e-10  # sums that differ by less, relative to the largest tension, count as equal
 
 
 @kernel
 def distribute_on_polygon(
     method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
 ) -> int:
-    """Fill the point (r,) of `near` by centroid or polygon walk. The sides of the last polygon are tried first."""
+    """Fill the point (r,) of `near` by centroid or polygon walk. First, the sides of the last polygon are tried."""
     r, m = null.shape
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
@@ -149,9 +148,9 @@ def distribute_on_polygon(
     reference = near.reference
     x = reference[0]
     y = reference[1] if r == 2 else 0.0
-    if method == codes.POLYGON_WALK and parameter == WALK_SUM:
+    if method == codes.POLYGON_WALK and parameter == codes.WALK_SUM:
         x, y = lowest_corner(bounds, null, corners, count, x, y)
-    elif method == codes.POLYGON_WALK and parameter == WALK_NORM:
+    elif method == codes.POLYGON_WALK and parameter == codes.WALK_NORM:
         if most_violated_bound(null, bounds, reference, 0.0, True) >= 0:
             x, y = nearest_corner_point(corners, count, x, y)
     else:
@@ -191,7 +190,7 @@ def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
 
 @kernel
 def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
-    """Fill the corners of the feasible polygon, or for r = 1 the ends of the interval; returns the number, 0 if empty.
+    """Fill the corners of the feasible polygon, or for r = 1 the interval's ends. Returns their number, 0 if empty.
 
     The edge of the box around the polygon replaces an infinite end of the interval, with the label of the box.
     """
@@ -211,7 +210,7 @@ def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def centroid(corners: Array, count: int) -> tuple[float, float]:
-    """Centroid of a convex polygon. If its area is zero: the mean of its corners."""
+    """Centroid of a convex polygon, or the mean of its corners if its area is zero."""
     x0 = corners[0, 0]
     y0 = corners[0, 1]
     area = 0.0
@@ -242,7 +241,7 @@ def centroid(corners: Array, count: int) -> tuple[float, float]:
 def lowest_corner(
     bounds: Array, null: Array, corners: Array, count: int, goal_x: float, goal_y: float
 ) -> tuple[float, float]:
-    """The point with the least sum of tensions. If a whole side has this sum: its point nearest to the goal."""
+    """Point with the least sum of tensions. If a whole side has the least sum, the point of it nearest to the goal."""
     r, m = null.shape
     gx = 0.0
     gy = 0.0

@@ -1,7 +1,7 @@
 """Tension distribution methods that are not projections: their selection, the analytic center, and the closed forms.
 
 The analytic center has the largest product of the distances to all limits. The closed forms give tensions near the
-middle of the limits without a search. At some feasible poses they find no distribution.
+middle of the limits without a search. At some feasible poses, the closed forms find no distribution.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from sagline.kernels.tension import nearest
 from sagline.kernels.tension.on_polygon import centroid, distribute_on_polygon, feasible_corners
 from sagline.kernels.tension.polygon import WorkArrays
 
-THIN = 1e-9  # relative to the largest tension; a thinner feasible set has no center
+THIN = 1e-9  # a feasible set that is thinner, relative to the largest tension, has no center
 NEWTON_STEPS = 200
 CENTERED = 1e-18  # square of the Newton decrement at which the search ends
 
 
 @kernel
 def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
-    """Move the point (r,) to the analytic center. The search starts from the previous center if there is one."""
+    """Move `point` (r,) to the analytic center. If a previous center exists, the search starts from it."""
     corners, labels, known = work.corners, work.labels, work.known
     if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
         return codes.POSE_SOLVED
@@ -71,7 +71,7 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
     """Fill the point (r,) whose tensions are farthest from their nearest limits. Returns the pose's status."""
     r, m = null.shape
     rows, memory = block(work.rest, r + 1, 2 * m)
-    # one bound per limit; the distance from all limits is an additional unknown, by which the bounds are narrowed
+    # one bound per limit; an additional unknown, the distance from all limits, narrows the bounds
     halves, memory = block(memory, STRIP_ROWS, 2 * m)
     vectors, memory = block(memory, 2, r + 1)
     cost, found = vectors[0], vectors[1]
@@ -142,7 +142,7 @@ def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -
     return False
 
 
-# a cable counts as dependent on the fixed cables if the squared length of its remaining row is smaller
+# least squared length of a cable's remaining row; a smaller row depends on the fixed cables
 DEPENDENT = 1e-10
 
 
@@ -178,7 +178,7 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
 
 @glue
 def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
-    """Fix the cable with the largest violation at its limit and distribute the rest. Repeat while limits are violated.
+    """Fix the cable with the largest violation at its limit, distribute the rest, and repeat while limits are violated.
 
     The tensions change in place, by orthogonal steps in the null space. A cable that was fixed remains fixed.
     """
@@ -219,7 +219,7 @@ def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, ten
 def _puncture(bounds: Array, tension: Array) -> None:
     """Move the tensions toward the minimum norm (START) until a limit is reached."""
     m = tension.size
-    share = 0.0  # 0 at the minimum norm, 1 at the given tensions
+    share = 0.0  # share of the way: 0 at the minimum norm, 1 at the given tensions
     for i in range(m):
         start = bounds[START, i]
         way = tension[i] - start

@@ -17,7 +17,7 @@ from sagline.kernels.algebra.programs import Basis, new_basis
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
-FLAT = 1e-12  # length of a null-space row; the tension of a cable with a shorter row is constant
+FLAT = 1e-12  # a cable whose null-space row is shorter has a constant tension
 SPARE_CORNERS = 6  # corners in addition to two per cable: corners of the box, and the corner to insert
 
 
@@ -29,8 +29,8 @@ def _cut_polygon(
 
     The corners change in place. The border of a half-plane crosses the border of a convex polygon at most twice.
     """
-    leaving = -1  # last corner inside, before the first corner outside
-    entering = -1  # first corner inside, after the last corner outside
+    leaving = -1  # last corner inside the half-plane, before the first corner outside
+    entering = -1  # first corner inside the half-plane, after the last corner outside
     kept = 0
     before = x * corners[count - 1, 0] + y * corners[count - 1, 1] - side >= -slack
     for k in range(count):
@@ -65,7 +65,7 @@ def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, sid
 
 @kernel
 def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
-    """Remove the corners outside, and make space for the two ends of a new side. Returns the index of the first end."""
+    """Remove the corners outside the half-plane, and make space for the ends of a new side. Returns its first index."""
     if leaving >= entering:  # the corners inside lie between the two ends: move them to the front
         for k in range(kept):
             corners[k, 0], corners[k, 1] = corners[entering + k, 0], corners[entering + k, 1]
@@ -132,9 +132,9 @@ def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, la
 
 @kernel
 def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
-    """Fill the corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon; returns the count, 0 if empty.
+    """Fill corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon. Returns the number of corners.
 
-    bounds: minimum-norm tensions and limits (3, m); null: orthonormal basis, one vector per row, (2, m).
+    `bounds`: minimum-norm tensions and limits (3, m). `null`: orthonormal basis, one vector per row, (2, m).
     """
     m = null.shape[1]
     largest = largest_bound(bounds)
@@ -167,7 +167,7 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
 def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
     """Fill the corners of the feasible polygon from its known sides. False if the polygon has other sides.
 
-    The known sides are correct if they follow each other in this order, and if no limit excludes a corner.
+    The known sides are correct if they have the same order around the new polygon, and if no limit excludes a corner.
     """
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
@@ -215,7 +215,7 @@ def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: flo
 
 @kernel
 def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tuple[float, float]:
-    """Projection of the outer point (x, y) onto a convex polygon."""
+    """Nearest point of a convex polygon to the point (x, y) outside it."""
     best = math.inf
     best_x = x
     best_y = y
@@ -235,7 +235,7 @@ class WorkArrays(NamedTuple):
 
     corners: Array  # corners of the feasible polygon, (2m + SPARE_CORNERS, 2)
     labels: Indices  # labels of its sides, (2m + SPARE_CORNERS,)
-    known: Indices  # number of corners of the last polygon, (1,); 0 if there is none
+    known: Indices  # number of corners of the last polygon, (1,); 0 without a polygon
     basis: Basis  # basis of the linear program of the last iteration
     rest: Memory  # memory that does not keep its content
 

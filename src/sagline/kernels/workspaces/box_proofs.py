@@ -1,4 +1,4 @@
-"""Proofs for a box of poses: tensions within the limits, or a direction between demand and available wrenches."""
+"""Proofs for a box of poses: tensions within the limits, or a direction that separates demand and cable wrenches."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange,
 from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, rise, rise_rate, sag_force_slope
 from sagline.kernels.workspaces.wrench_set import Loads, dot6, reach_of_loads
 
-# largest error of the pseudo-inverse; with a larger error the pose is almost singular, and there is no proof
+# largest error of the pseudo-inverse; with a larger error, the pose is almost singular and the proof fails
 POOREST_INVERSE = 1e-6
-HEADROOM = 1.2  # size of the box of tensions for the proof, divided by its first estimate
-ITERATIONS = 3  # number of iterations of this estimate
+HEADROOM = 1.2  # size of the box of tensions in the proof, divided by the first estimate of this size
+ITERATIONS = 3  # number of iterations that improve the size of the box of tensions
 
 
 class Precision(NamedTuple):
     """Safety terms of the proofs; tests set them to zero."""
 
-    bends: float  # weight of the terms beyond the linear prediction; 1 in proofs
+    bends: float  # weight of the terms of second and higher order; 1 in proofs
     rounding: float  # rounding error of a sum, relative to the sum of its terms' magnitudes
 
 
@@ -41,7 +41,7 @@ def proves_inside(
 ) -> bool:
     """True if the tensions tau + J^+ z are within the limits at all poses of `box`; z is the change of the demand.
 
-    centered.give is filled with the part of each tension change that is due to the set of wrenches [N].
+    centered.give is filled with the change of each tension due to the set of wrenches [N].
     """
     n, m = place.matrix.shape
     inverse, memory = block(memory, m, n)
@@ -145,7 +145,7 @@ def proves_inside(
 
 
 BORNE = 0.3  # largest share of the gap that a cable between its limits may use
-PIECES = 4  # number of pieces of the range below the tension of a cable; the lower end of a piece is half its upper end
+PIECES = 4  # number of pieces of the range below the tension; the lower end of a piece is half its upper end
 
 # rows of the cables' contributions along a direction
 VALUE, BENT, SPREAD, HANGING, HANGING_SPREAD, HANGING_BENT = 1, 2, 3, 4, 5, 6
@@ -164,8 +164,8 @@ def proves_outside(
 ) -> bool:
     """True if a direction y, which depends on the pose, separates demand and available wrenches in a box of poses.
 
-    The direction is the residual of the centered tensions, with its derivatives with respect to the pose. After a small
-    correction of the direction, the cables between their limits contribute zero or less.
+    The direction is the residual of the centered tensions, with its derivatives with respect to the pose. The direction
+    is slightly corrected, so that the cables between their limits contribute zero or less.
     """
     n, m = place.matrix.shape
     wide, memory = block(memory, 7 + MOTIONS, m)
@@ -257,14 +257,14 @@ def proves_outside(
 def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, turning: Array, rows: Array) -> None:
     """Fill the contributions along a direction, per newton of tension and of sag force, and their changes in a box.
 
-    direction: y at the middle, (6,); turning: derivatives of y with respect to each motion, (MOTIONS, 6); rows: filled
-    for tensions, then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the largest
-    deviation from the linear change (BENT).
+    `direction`: y at the middle, (6,). `turning`: derivatives of y with respect to each motion, (MOTIONS, 6). `rows`:
+    filled for tensions, then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the
+    largest deviation from the linear change (BENT).
     """
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3
     arm = norm3(direction[3], direction[4], direction[5])
-    turned_arm = 0.0  # change of the moment part of y
+    turned_arm = 0.0  # changes of the moment part of y
     square = 0.0
     for motion in range(motions):
         length = norm3(turning[motion, 3], turning[motion, 4], turning[motion, 5])
@@ -302,7 +302,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
                 vz += direction[3] * rx + direction[4] * ry
             slope = place.slopes[motion]
             change = vx * place.full[0, i] + vy * place.full[1, i] + vz * place.full[2, i]
-            # only the derivative of the unit vector contributes
+            # here only the derivative of the unit vector contributes
             change += x * slope[i] + y * slope[m + i] + z * slope[2 * m + i]
             if motion < 3:
                 half = box.half[motion]
@@ -327,7 +327,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
 
 @formula
 def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
-    """Largest value of t slope + min(t rate, most) for 0 <= t <= width; rate and most are >= 0."""
+    """Largest value of t `slope` + min(t `rate`, `most`) for 0 <= t <= `width`; `rate` and `most` are >= 0."""
     if slope >= 0.0 or width == 0.0:
         return width * slope + min(rate * width, most) if width > 0.0 else 0.0
     if rate + slope <= 0.0:
@@ -338,7 +338,7 @@ def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
 
 @kernel
 def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
-    """Upper bound, in a box, of the growth of the contribution of cable `i` along y if its tension is not `tau`."""
+    """Upper bound in a box: growth of the contribution of cable `i` along y if its tension differs from `tau`."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)

@@ -1,9 +1,9 @@
-"""Tensions for a box of poses: limits that apply at all its poses, and tensions well inside these limits at its middle.
+"""Tensions for a box of poses: limits that apply at all poses of the box, and centered tensions at its middle.
 
 Centered tensions minimize a sum of two terms. The first term is the smoothing times the sum over cables of -log(tau -
 low) - log(high - tau). The second term is half the squared residual of the demand. If the demand is feasible, the
-tensions are near the analytic center. Otherwise the residual points along the direction that separates the demand from
-all wrenches of the cables. The error of this direction is of the order of the square root of the smoothing. The method
+tensions are near the analytic center. If not, the residual points along the direction that separates the demand from
+all wrenches of the cables. The error of the direction is of the order of the square root of the smoothing. The method
 takes primal-dual Newton steps. Each step solves a linear system with one unknown per free motion of the platform.
 """
 
@@ -24,9 +24,9 @@ from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
 from sagline.kernels.workspaces.sag_force_bounds import has_sag, largest_sag_force, sag_force_slope
 
 STEPS = 40
-REDUCTION = 0.1  # smallest factor of the smoothing per step
+REDUCTION = 0.1  # smallest factor by which a step reduces the smoothing
 TO_LIMIT = 0.95  # largest step, relative to the distance to a limit
-# largest relative error of slack times barrier force at the center; it has no effect on the validity of proofs
+# largest relative error of slack times barrier force at the center; proofs are valid at any error
 CENTERED = 0.2
 FARTHEST = 50.0  # upper end of the search for a tension without limit, relative to the sum of all forces
 
@@ -39,7 +39,7 @@ class Centered(NamedTuple):
     tau: Array  # tensions, strictly inside, (m,)
     below: Array  # barrier forces of the lower limits [N], (m,), > 0
     above: Array  # barrier forces of the upper limits [N], (m,), > 0
-    give: Array  # inverse of the second derivative of the barrier for each tension, (m,)
+    give: Array  # for each tension, inverse of the second derivative of the barrier, (m,)
     right: Array  # demand on the chord tensions [N], (n,)
     left: Array  # residual of the demand, (n,)
     normal: Array  # work array, (n, n)
@@ -48,7 +48,7 @@ class Centered(NamedTuple):
 
 @glue
 def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
-    """Work arrays for m cables and n rows, which contain no tensions yet, and the remaining memory."""
+    """Work arrays for `m` cables and `n` rows, without tensions yet, and the remaining memory."""
     wide, memory = block(memory, 6, m)
     thin, memory = block(memory, 3 + n, n)
     centered = Centered(wide[0], wide[1], wide[2], wide[3], wide[4], wide[5], thin[0], thin[1], thin[3:], thin[2])
@@ -89,7 +89,7 @@ def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> Non
 
 @kernel
 def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> bool:
-    """Fill the factor of `unit` 1 + matrix give matrix^T, (n, n). False if this sum is not positive definite."""
+    """Fill the Cholesky factor of `unit` * 1 + matrix give matrix^T, (n, n). False if this is not positive definite."""
     n, m = matrix.shape
     for k in range(n):
         for j in range(k + 1):
@@ -104,8 +104,8 @@ def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> boo
 def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     """Move the tensions to the smoothed center. Returns the square of the remaining residual [N^2].
 
-    matrix: structure matrix, all rows in newtons, (n, m); smoothing: [N^2], > 0; centered: contains limits and right
-    side; the other fields are filled.
+    `matrix`: structure matrix, all rows in newtons, (n, m). `smoothing`: [N^2], > 0. `centered`: contains limits and
+    right side; the other fields are filled.
     """
     n, m = matrix.shape
     tau, low, high, below, above = centered.tau, centered.low, centered.high, centered.below, centered.above
@@ -166,12 +166,12 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     return square
 
 
-SMOOTHNESS = 0.01  # residual that is due to the smoothing, relative to the change of the demand in a box
-SLACK = 0.45  # largest X at which a frame-end limit changes at most as fast as the sag force
-# smallest range of the search that remains after the set of wrenches is subtracted, relative to the full range
+SMOOTHNESS = 0.01  # size of the residual due to smoothing, relative to the change of the demand in a box
+SLACK = 0.45  # up to this X, a frame-end limit changes at most as fast as the sag force
+# smallest range of the search after the set of wrenches is subtracted, relative to the full range
 LEAST_WIDTH = 0.05
-ITERATIONS = 2  # iterations of tensions and their sag forces
-LEAST_WAY = 1e-4  # smallest displacement that determines the smoothing, relative to a chord
+ITERATIONS = 2  # number of alternating computations of tensions and sag forces
+LEAST_WAY = 1e-4  # smallest displacement, relative to a chord, from which the smoothing is computed
 
 
 class Ranges(NamedTuple):
@@ -188,7 +188,7 @@ class Ranges(NamedTuple):
 def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges) -> None:
     """Fill the admissible tensions of all poses of a box from the admissible tensions at its middle.
 
-    The longer the chord, the larger is the smallest tension that the limit of the sag admits.
+    The smallest tension that the limit of the sag admits increases with the length of the chord.
     """
     cables = curves.cables
     for i in range(place.way.size):
@@ -207,12 +207,12 @@ def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges
 
 @kernel
 def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> None:
-    """Widen or narrow the chord limits that follow from frame-end limits at the middle, by their change in a box.
+    """Widen or narrow the chord limits by the largest change of the limits from the middle to any pose of the box.
 
-    If a cable is not slack, a limit changes at most as fast as the sag force. A limit at which the cable may be slack
-    somewhere in the box is replaced: in proofs of feasibility by the least limit without slackness, in proofs of
-    infeasibility by zero. If a cable has no admissible tension at the middle, it is slack at any admissible tension
-    elsewhere in the box.
+    If a cable is not slack, a limit changes at most as fast as the sag force. If a cable may be slack at a limit
+    somewhere in the box, this limit is replaced: in proofs of feasibility by the smallest chord tension at which the
+    cable is not slack, and in proofs of infeasibility by 0 N. If a cable has no admissible tension at the middle, it
+    is slack at any admissible tension elsewhere in the box.
     """
     cables = curves.cables
     way = place.way[i]
@@ -233,7 +233,7 @@ def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, r
     The vertical parts of all tensions balance weight, load and sag forces. The vertical part of one tension is
     therefore at most this load minus the smallest vertical parts of the other tensions.
 
-    freedom: rows that select the free motions, (n, 6); upward: largest vertical force that the cables must supply,
+    `freedom`: rows that select the free motions, (n, 6). `upward`: largest vertical force that the cables must supply,
     without sag forces [N].
     """
     free = 0.0
@@ -254,7 +254,7 @@ def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, r
 
 @kernel
 def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ranges: Ranges, slopes: Array) -> None:
-    """Fill the derivatives of the wrench of tensions and sag forces with respect to each motion, (MOTIONS, 6)."""
+    """Fill the derivatives of the wrench of tensions and sag forces by each motion of the platform, (MOTIONS, 6)."""
     m = place.way.size
     for motion in range(MOTIONS):
         slopes[motion] = 0.0
@@ -289,7 +289,7 @@ def _fill_demand(
 ) -> None:
     """Fill the demand on the chord tensions, with the sag forces at the present tensions.
 
-    load: wrench, (6,); centered: its tensions are used, its right side is filled; ranges: the sag forces are filled.
+    `load`: wrench, (6,). `centered`: its demand is filled. `ranges`: its sag forces are filled.
     """
     n, m = place.matrix.shape
     sag_forces_at(curves, centered.tau, ranges.sag_force)
@@ -308,7 +308,7 @@ def _fill_demand(
 
 @glue
 def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
-    """Smoothing for a box [N^2]. It is proportional to the square of the change of the tensions' wrench in the box."""
+    """Smoothing for a box [N^2], proportional to the squared change of the wrench of constant tensions in the box."""
     square = 0.0
     for i in range(tau.size):
         change = tau[i] * max(place.way[i] / geometry[g.CHORD, i], LEAST_WAY)
@@ -318,7 +318,7 @@ def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
 
 @glue
 def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered) -> bool:
-    """Fill the limits of the search for tensions: the limits of the box, narrowed by `taken` (m,).
+    """Fill the limits of the search for tensions: the limits of the box, narrowed by `taken` (m,) at both ends.
 
     Returns False if a lower limit exceeds the upper limit.
     """

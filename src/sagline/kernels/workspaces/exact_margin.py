@@ -1,9 +1,10 @@
-"""Margin with the exact sag forces of the cables, if bounds of the sag forces do not decide its sign.
+"""Margin with the exact sag forces of the cables, for poses where bounds of the sag forces do not decide its sign.
 
 Let y be the normal of the limiting facet, and e the load with y . e = 1 N. The margin near zero is the largest multiple
-of e that the cables can supply in addition to the demand. Newton steps with the exact sag forces find this multiple.
-All components of the balance are hard equations, except the component along e. Farther from zero, the decision of
-`inverse` confirms the sign of the margin.
+of e that the cables can supply in addition to the demand. Newton steps with the exact sag forces find local maxima of
+this multiple from several initial tensions. All components of the balance are hard equations, except the component
+along e. The feasibility decision of `inverse` confirms the sign: a positive multiple does not prove that the cables can
+supply the demand itself. If this decision has no result, the distribution iterations of `inverse` are tried.
 """
 
 from __future__ import annotations
@@ -13,26 +14,29 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.factors import solve_general
+from sagline.kernels.algebra.bounds import START
+from sagline.kernels.algebra.factors import copy, solve_general
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
 from sagline.kernels.cable.states import TensionLimits
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.feasibility import demand_of_pose, new_demand
+from sagline.kernels.inverse.poses import distribute_and_solve_cables
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, vector
-from sagline.kernels.statics import Platform, along_freedom, new_balance, set_pose
-from sagline.kernels.tension.bracket import decide_feasibility
+from sagline.kernels.statics import Balance, Platform, along_freedom, new_balance, set_pose
+from sagline.kernels.tension.bracket import NODES, decide_feasibility
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change
+from sagline.kernels.tension.nearest import Distribution, new_reference_point
 from sagline.kernels.workspaces.sag_force_bounds import HIGH, LOW, SAG_FORCE_LOW, SLOPE
 
 EXACT = 1e-5  # bound of the error of a margin with exact sag forces, relative to the largest force
-NARROW = 1e-3  # relative to the largest force; if the bounds are narrower, the margin in the limiting facet is used
-CLOSE = 1e-3  # relative to the largest force; the sign of a smaller margin with exact sag forces is not confirmed
-NEAR = 1e-2  # relative to the largest force; the search that confirms a smaller margin is short
-SHORT, LONG = 4, 300  # largest numbers of examined ranges
-HARDLY = 1e-9  # value at a pose where the decision and the margin have different signs, relative to the largest force
-FURTHER = 1.01  # start of the search, relative to the upper bound of the margin
-IN_FACET = 1e-9  # relative to the terms of the product; a secant with a smaller product is in the facet
+NARROW = 1e-3  # if the bounds are closer, relative to the largest force, the margin in the limiting facet is used
+CLOSE = 1e-3  # the sign of a smaller negative margin, relative to the largest force, is not proved
+NEAR = 1e-2  # a smaller negative margin, relative to the largest force, is proved by a short search
+SHORT = 4  # largest number of examined ranges of a short search; other searches have that of `inverse`
+HARDLY = 1e-9  # value, relative to the largest force, if the decision contradicts the sign of the margin
+FURTHER = 1.01  # initial value of the search, relative to the upper bound of the margin
+IN_FACET = 1e-9  # a secant is in the facet if its relative product with the normal is smaller
 
 VALUE, BELOW, ABOVE = 0, 1, 2  # rows of a margin (3,) [N]
 
@@ -60,9 +64,9 @@ def settle_margin(
     margin: Array,
     memory: Memory,
 ) -> int:
-    """Replace `margin` (3,) by its value with exact sag forces. Returns the status of the margin.
+    """Replace `margin` (3,) by the margin with exact sag forces. Returns the status of the new margin.
 
-    platform: contains the least favorable wrench of the set.
+    `platform`: contains the least favorable wrench of the set.
     """
     cables = curves.cables
     m, n = cables.low.size, platform.freedom.shape[0]
@@ -82,28 +86,57 @@ def settle_margin(
     demand, lever = demand_of_pose(platform, cables, balance, space, change)
     for k in range(demand.soft, n):
         load[k] /= lever
-    exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], change.tau, rest)
-    if not abs(exact) <= CLOSE * size:
-        verdict, _, _, _ = decide_feasibility(
-            curves, demand, SHORT if abs(exact) <= NEAR * size else LONG, change, rest
-        )
-        feasible, infeasible = verdict == codes.POSE_SOLVED, verdict == codes.POSE_INFEASIBLE
-        if not abs(exact) < math.inf or (exact < 0.0 if feasible else infeasible and exact >= 0.0):
-            exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], change.tau, rest)
-        if not abs(exact) < math.inf:
-            exact = margin[VALUE]
-        if feasible:
-            _write_value(margin, max(exact, HARDLY * size), EXACT * size)
-            if facet.single:
-                margin[BELOW] = max(margin[BELOW], 0.0)
-                return codes.MARGIN_FEASIBLE
-            return codes.MARGIN_OPEN
-        if infeasible:
-            _write_value(margin, min(exact, -HARDLY * size), EXACT * size)
-            margin[ABOVE] = min(margin[ABOVE], margin[VALUE])
-            return codes.MARGIN_INFEASIBLE
+    exact, enough, verdict = -math.inf, math.inf, codes.POSE_BORDERLINE
+    for search in range(3):
+        if search != 1:  # the second search starts at the tensions of the multiple
+            copy(balance.bounds[START], change.tau)
+        nodes = 1 if search == 0 else SHORT if -NEAR * size <= exact < 0.0 else NODES
+        verdict, _, enough, _ = decide_feasibility(curves, demand, nodes, change, rest)
+        exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], change.tau, rest)
+        if verdict != codes.POSE_BORDERLINE or -CLOSE * size <= exact < 0.0:
+            break
+    open_ = verdict == codes.POSE_BORDERLINE and not -EXACT * size <= exact < 0.0
+    if open_ and _distributes_tensions(curves, limits, platform, balance, change.tau, rest):
+        verdict = codes.POSE_SOLVED
+        exact = max(exact, _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], change.tau, rest))
+    if verdict == codes.POSE_SOLVED and (exact >= 0.0 or exact < -EXACT * size):
+        _write_value(margin, exact if exact >= 0.0 else HARDLY * size, EXACT * size)
+        if facet.single:
+            margin[BELOW] = max(margin[BELOW], 0.0)
+            return codes.MARGIN_FEASIBLE
+        return codes.MARGIN_OPEN
+    if exact >= 0.0 and enough < math.inf:
+        exact = -enough
+    if not abs(exact) < math.inf:
+        exact = margin[VALUE]
+    if verdict == codes.POSE_INFEASIBLE:
+        _write_value(margin, min(exact, -HARDLY * size), EXACT * size)
+        margin[ABOVE] = min(margin[ABOVE], margin[VALUE])
+        return codes.MARGIN_INFEASIBLE
     _write_value(margin, exact, EXACT * size)
     return codes.MARGIN_OPEN
+
+
+@glue
+def _distributes_tensions(
+    curves: Curves, limits: TensionLimits, platform: Platform, balance: Balance, tau: Array, memory: Memory
+) -> bool:
+    """True if the distribution iterations of `inverse` balance the demand. Then `tau` (m,) is filled."""
+    m = tau.size
+    rows, rest = block(memory, 2, m)
+    weight, goal = rows[0], rows[1]
+    weight[:] = 1.0
+    goal[:] = 0.0
+    distribution = Distribution(codes.MINIMUM_NORM, 0.0, codes.CHORD_TENSION, weight, goal)
+    near, rest = new_reference_point(rest, goal, m - platform.freedom.shape[0])
+    status = set_pose(curves.model, limits, codes.CHORD_TENSION, weight, platform, curves.cables, balance)
+    if status == codes.POSE_SOLVED:
+        status = distribute_and_solve_cables(
+            curves.model, distribution, platform, curves.cables, balance, near, None, curves.statuses
+        )
+    if status == codes.POSE_SOLVED:
+        copy(curves.cables.tau, tau)
+    return status == codes.POSE_SOLVED
 
 
 @glue
@@ -126,9 +159,9 @@ def _write_value(margin: Array, exact: float, error: float) -> None:
 
 @glue
 def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, load: Array, memory: Memory) -> float:
-    """Margin with exact sag forces, from the tensions at which the load meets the facet. NaN outside the facet.
+    """Margin with exact sag forces from the tensions where the load meets the facet. NaN if the load misses the facet.
 
-    The tensions follow from the secants. If the bounds are narrow, their errors have only a second-order effect.
+    The tensions follow from the secants. If the bounds are narrow, errors of the tensions have a second-order effect.
     """
     columns, y, bands = facet.columns, facet.direction, facet.bands
     n, m = platform.freedom.shape[0], columns.shape[1]
@@ -180,7 +213,7 @@ def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, l
 
 @glue
 def _component(freedom: Array, k: int, columns: Array, i: int) -> float:
-    """Component along free motion `k` of a wrench, column `i` of `columns` (6, m)."""
+    """Component of column `i` of `columns` (6, m), a wrench, along the free motion `k`."""
     total = 0.0
     for a in range(6):
         total += freedom[k, a] * columns[a, i]
@@ -189,7 +222,7 @@ def _component(freedom: Array, k: int, columns: Array, i: int) -> float:
 
 @glue
 def _fill_load(freedom: Array, facet: LimitingFacet, load: Array) -> None:
-    """Fill the load e (n,) along the free motions with y . e = 1; e is a moment if y has no force part."""
+    """Fill the load e (n,) along the free motions, with y . e = 1. The load is a moment if y has no force part."""
     y = facet.direction
     pure = y[0] == 0.0 and y[1] == 0.0 and y[2] == 0.0
     weight = 1.0 if pure else facet.arm * facet.arm
@@ -205,8 +238,11 @@ def _largest_multiple(
 ) -> float:
     """Largest multiple of `load` that the cables supply in addition to `demand`. Infinite or NaN if not found.
 
-    A reflection turns the load to the first component, which is the only soft component. The search starts beyond the
-    upper bound.
+    A reflection turns the load to the first component. Only this component is soft. The searches start at `above`,
+    beyond the upper bound: from `tau`, from equal high tensions, and from the best tensions with one cable at its lower
+    limit. The first multiple that is certainly positive ends the search.
+
+    `tau`: overwritten with the tensions that supply the multiple.
     """
     n, m = demand.matrix.shape
     rows, rest = block(memory, 2 * n + 4, m)
@@ -232,19 +268,30 @@ def _largest_multiple(
         _reflect_vector(mirror, square, rows[:n, i])
         _reflect_vector(mirror, square, rows[n : 2 * n, i])
         rows[2 * n, i], rows[2 * n + 1, i] = bands[LOW, i], bands[HIGH, i]
-        rows[2 * n + 2, i] = min(max(tau[i], bands[LOW, i]), bands[HIGH, i])
     turned = Demand(rows[:n], rows[n : 2 * n], right, 1, demand.size)
     change = TensionChange(rows[2 * n + 2], rows[2 * n + 3], vectors[2], vectors[3])
-    left = least_change(curves, turned, rows[2 * n : 2 * n + 2], change, rest)
-    for k in range(1, n):
-        if not abs(change.residual[k]) <= HARDLY * demand.size:
-            return math.nan
-    return further - left / length
+    best = math.inf
+    for start in range(m + 2):
+        if start >= 2 and not tau[start - 2] > bands[LOW, start - 2]:
+            continue
+        for i in range(m):
+            first = demand.size if start == 1 else 0.0 if start == i + 2 else tau[i]
+            change.tau[i] = min(max(first, bands[LOW, i]), bands[HIGH, i])
+        left = least_change(curves, turned, rows[2 * n : 2 * n + 2], change, rest)
+        for k in range(1, n):
+            if not abs(change.residual[k]) <= HARDLY * demand.size:
+                left = math.inf
+        if left < best:
+            best = left
+            copy(change.tau, tau)
+        if further - best / length > EXACT * demand.size:
+            break
+    return further - best / length
 
 
 @glue
 def _reflect_vector(mirror: Array, square: float, vector: Array) -> None:
-    """Reflect a vector; the mirror's normal (n,) has a squared length of `square`."""
+    """Reflect `vector` at the plane with the normal `mirror` (n,), whose squared length is `square`."""
     along = 0.0
     for k in range(vector.size):
         along += mirror[k] * vector[k]

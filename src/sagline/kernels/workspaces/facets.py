@@ -2,10 +2,11 @@
 
 Elimination with complete pivoting turns n columns, the basis, into unit vectors. Each row is then a normal to all
 columns of the basis except one. The other r = m - n columns are not in the basis. A facet contains k of the other
-columns. It also contains all columns of the basis except k + 1 of them. Its normal is a combination of k + 1 rows. The
-coefficients are the k x k minors of the k columns in these rows. Laplace's expansion computes them from the minors of k
-- 1 columns. The subsets of the other columns are visited depth first. A loop without branches computes all normals of a
-subset. A normal with rounding errors is still a valid direction for the margin.
+columns and n - 1 - k columns of the basis. The normal of the facet is a combination of k + 1 rows. The coefficients of
+the k + 1 rows are the k x k minors of the k columns. Laplace's expansion computes these minors from the minors of k - 1
+columns. Loops over many subsets of the other columns vectorize: the subsets of up to three columns are in order of
+their last column, so that all subsets of the columns before a further column are the first ones. Further columns are
+added depth first. A normal with rounding errors is still a valid direction for the margin.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.jit import formula, glue
+from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
-# relative to the largest entry, as in `kernels.algebra.factors`; if a pivot is smaller, the rank is not full
+# the rank is not full if a pivot is smaller, relative to the largest entry (as in `kernels.algebra.factors`)
 RANK = 1e-9
 DEPENDENT = 1e-10  # columns with a smaller minor count as linearly dependent
 LIMIT = 1 << 40  # largest number of steps, which is never reached
@@ -35,6 +36,12 @@ START: Final = np.array(
     [[sum(bits.bit_count() < k for bits in subsets) for k in range(MOST_FREE + 2)] for subsets in _SUBSETS]
 )
 MEMBERS: Final = np.array([([i for i in range(6) if bits >> i & 1] + [0] * 6)[:6] for bits in range(64)])
+# Laplace's expansion: signs of the terms, 0 for terms that do not exist, and the rows without the row of the term
+SIGNS: Final = np.array([[(-1.0) ** j * (j < bits.bit_count()) for j in range(6)] for bits in range(64)])
+FEWER: Final = np.array(
+    [[bits & ~(1 << int(MEMBERS[bits, j if j < bits.bit_count() else 0])) for j in range(6)] for bits in range(64)]
+)
+AT_ONCE = 3  # largest number of other columns whose subsets are all stored
 
 
 class Facets(NamedTuple):
@@ -44,9 +51,26 @@ class Facets(NamedTuple):
     # sum of the absolute values of these six components, with moments times the lever arm.
     table: Array
     others: Array  # components of the other columns along the rows, scaled to a largest entry of 1, (r, n)
-    minors: Array  # minors of the present subset and of its leading parts, for each set of rows, (n, 2^n)
+    minors: Array  # minors of the present subsets and of their leading parts, for each set of rows, (2^n, subsets)
     basis: Indices  # index of the basis column of each row, (n,)
-    chosen: Indices  # present subset of the other columns, from index 1 on, (n + 1,)
+    outside: Indices  # indices of the other columns, (r,)
+    chosen: Indices  # further columns of the present subsets, from index AT_ONCE + 1 on, (n + 1,)
+
+
+@formula
+def subsets_of(count: int, size: int) -> int:
+    """Number of subsets of `size` elements of a set of `count` elements, for a size of at most AT_ONCE."""
+    ways = 1
+    for k in range(size):
+        ways = ways * (count - k) // (k + 1)
+    return ways
+
+
+@formula
+def most_subsets(n: int, m: int) -> int:
+    """Largest number of subsets that are present together."""
+    r = m - n
+    return max(1, r, r * (r - 1) // 2, r * (r - 1) * (r - 2) // 6)
 
 
 @glue
@@ -54,21 +78,26 @@ def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
     """Work arrays for n free motions and m cables, and the remaining memory."""
     table, memory = block(memory, n, m + 7)
     others, memory = block(memory, m - n, n)
-    minors, memory = block(memory, n, 1 << n)
+    minors, memory = block(memory, 1 << n, most_subsets(n, m))
     basis, memory = counters(memory, n)
+    outside, memory = counters(memory, m - n)
     chosen, memory = counters(memory, n + 1)
-    return Facets(table, others, minors, basis, chosen), memory
+    return Facets(table, others, minors, basis, outside, chosen), memory
 
 
 @glue
-def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
-    """Eliminate in place, and fill the fields `basis` and `others`. False if the rank is not full."""
+def choose_basis(facets: Facets, n: int, m: int, lever: float, full: bool) -> bool:
+    """Eliminate in place, and fill the columns and the minors of single columns. False if the rank is not full.
+
+    If not `full`, only the rank is found, with pivots from one row at a time.
+    """
     table, basis = facets.table, facets.basis
+    width = m + 7 if full else m
     first = 0.0
     for k in range(n):
         row = column = -1
         largest = 0.0
-        for j in range(k, n):
+        for j in range(k, n if full else k + 1):
             for i in range(m):
                 if abs(table[j, i]) > largest:
                     largest = abs(table[j, i])
@@ -79,10 +108,12 @@ def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
         _exchange_rows(table, k, row)
         basis[k] = column
         _scale_row(table[k], 1.0 / table[k, column])
-        for j in range(n):
+        for j in range(0 if full else k, n):
             if j != k:
-                _subtract_row(table[j], table[j, column], table[k])
+                _subtract_row(table[j, :width], table[j, column], table[k])
                 table[j, column] = 0.0
+    if not full:
+        return True
     for k in range(n):
         for a in range(6):
             table[k, m + 6] += abs(table[k, m + a]) * (1.0 if a < 3 else lever)
@@ -97,6 +128,8 @@ def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
                 largest = max(largest, abs(table[k, i]))
             for k in range(n):
                 facets.others[count, k] = table[k, i] / largest if largest > 0.0 else 0.0
+                facets.minors[1 << k, count] = facets.others[count, k]
+            facets.outside[count] = i
             count += 1
     return True
 
@@ -123,29 +156,50 @@ def _subtract_row(row: Array, factor: float, other: Array) -> None:
 
 
 @glue
-def next_subset(facets: Facets, n: int, depth: int) -> int:
-    """Advance to the next subset of the other columns, and fill its minors. Returns its size, or -1 after the last.
+def next_subsets(facets: Facets, n: int, size: int) -> tuple[int, int]:
+    """Advance to the next subsets of the other columns, and fill their minors. Returns their size and their number.
 
-    depth: size of the present subset; the first subset is empty.
+    size: size of the present subsets; the first subset is empty. The size after the last subsets is -1.
     """
-    chosen, others, minors = facets.chosen, facets.others, facets.minors
-    r = others.shape[0]
-    if depth < n - 1 and (0 if depth == 0 else chosen[depth] + 1) < r:
-        chosen[depth + 1] = -1 if depth == 0 else chosen[depth]
-        depth += 1
-    while depth > 0 and chosen[depth] == r - 1:
-        depth -= 1
-    if depth == 0:
-        return -1
-    chosen[depth] += 1
-    column = others[chosen[depth]]
-    for s in range(START[n, depth], START[n, depth + 1]):
+    chosen, r = facets.chosen, facets.others.shape[0]
+    if size < min(AT_ONCE, n - 1, r):
+        size += 1
+        for i in range(size - 1 if size > 1 else r, r):  # `choose_basis` fills the minors of single columns
+            _add_column(facets, n, size, i, subsets_of(i, size - 1), subsets_of(i, size))
+        chosen[size] = AT_ONCE - 1
+        return size, subsets_of(r, size)
+    if AT_ONCE <= size < n - 1 and chosen[size] + 1 < r:
+        chosen[size + 1] = chosen[size]
+        size += 1
+    while size > AT_ONCE and chosen[size] == r - 1:
+        size -= 1
+    if size <= AT_ONCE:
+        return -1, 0
+    chosen[size] += 1
+    count = subsets_of(chosen[AT_ONCE + 1], AT_ONCE)
+    _add_column(facets, n, size, chosen[size], count, 0)
+    return size, count
+
+
+@kernel
+def _add_column(facets: Facets, n: int, size: int, column: int, count: int, first: int) -> None:
+    """Fill the minors of the first `count` subsets together with another column, from the index `first` on."""
+    minors = facets.minors
+    for s in range(START[n, size], START[n, size + 1]):
         rows = ORDER[n, s]
-        total = 0.0
-        sign = 1.0
-        for j in range(depth):
-            k = MEMBERS[rows, j]
-            total += sign * column[k] * minors[depth - 1, rows ^ (1 << k)]
-            sign = -sign
-        minors[depth, rows] = total
-    return depth
+        m0, m1, m2 = minors[FEWER[rows, 0]], minors[FEWER[rows, 1]], minors[FEWER[rows, 2]]
+        m3, m4, m5 = minors[FEWER[rows, 3]], minors[FEWER[rows, 4]], minors[FEWER[rows, 5]]
+        c0, c1, c2, c3, c4, c5 = signed_entries(rows, facets.others[column])
+        out = minors[rows, first:]
+        for c in range(count):
+            out[c] = c0 * m0[c] + c1 * m1[c] + c2 * m2[c] + c3 * m3[c] + c4 * m4[c] + c5 * m5[c]
+
+
+@formula
+def signed_entries(rows: int, column: Array) -> tuple[float, float, float, float, float, float]:
+    """Entries of a column in `rows`, with the signs of Laplace's expansion; the last ones are zero."""
+    return (
+        SIGNS[rows, 0] * column[MEMBERS[rows, 0]], SIGNS[rows, 1] * column[MEMBERS[rows, 1]],
+        SIGNS[rows, 2] * column[MEMBERS[rows, 2]], SIGNS[rows, 3] * column[MEMBERS[rows, 3]],
+        SIGNS[rows, 4] * column[MEMBERS[rows, 4]], SIGNS[rows, 5] * column[MEMBERS[rows, 5]],
+    )  # fmt: skip

@@ -1,8 +1,8 @@
 """The cables in a box of poses: geometry at the middle, and bounds of its change in the box.
 
-A box contains all positions within half an edge of its middle along each axis. At each position, the orientations
-differ from the orientation at the middle by a rotation about any axis, up to a given angle. If the angle is zero, all
-poses have the same orientation.
+Along each axis, a position in a box is at most half an edge from the middle of the box. At each position, the box
+contains all orientations that differ from the orientation at the middle by a rotation up to a given angle. If the angle
+is zero, all poses have the same orientation.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import fill_structure_matrix, is_rotation, rows_along_freedom
 
-BEND = 0.57735027  # half of the largest second derivative of x/|x| times |x|^2, which is 2/sqrt(3), rounded up
+BEND = 0.57735027  # half of 2/sqrt(3), rounded up; 2/sqrt(3) is the largest second derivative of x/|x|, times |x|^2
 MOTIONS = 6  # number of motions: three translations and three rotations
 
 
@@ -61,9 +61,9 @@ def set_cables_in_box(
 ) -> bool:
     """Fill `place` from the geometry of the cables. False if a platform end may meet its frame end in the box.
 
-    freedom: rows that select the free motions, (n, 6); geometry: rows of `cable_geometry` at the middle,
-    (GEOMETRY_ROWS, m); rotation: platform -> world at the middle, (3, 3); center: center of mass in the platform frame
-    [m], (3,); place: filled.
+    `freedom`: rows that select the free motions, (n, 6). `geometry`: rows of `cable_geometry` at the middle,
+    (GEOMETRY_ROWS, m). `rotation`: platform -> world at the middle, (3, 3). `center`: center of mass in the platform
+    frame [m], (3,). `place`: filled.
     """
     n, m = place.matrix.shape
     fill_structure_matrix(geometry, place.full)
@@ -116,7 +116,7 @@ def _set_slopes(geometry: Array, rotation: Array, center: Array, box: PoseRange,
             x, y, z = place.full[0, i], place.full[1, i], place.full[2, i]
             rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
             bx = by = bz = 0.0  # displacement of the platform end
-            sx = sy = sz = 0.0  # displacement of the lever's end
+            sx = sy = sz = 0.0  # displacement of the end of the lever
             if motion == 0:
                 bx = 1.0
             elif motion == 1:
@@ -152,7 +152,7 @@ def norm3(x: float, y: float, z: float) -> float:
 
 @formula
 def most_of_linear(box: PoseRange, slopes: Array) -> float:
-    """Largest value, in a box, of a linear function with slopes (MOTIONS,) that is zero at the middle."""
+    """Largest value in `box` of a linear function that is zero at the middle and has the slopes `slopes` (MOTIONS,)."""
     most = abs(slopes[0]) * box.half[0] + abs(slopes[1]) * box.half[1] + abs(slopes[2]) * box.half[2]
     if box.turn > 0.0:
         most += box.turn * norm3(slopes[3], slopes[4], slopes[5])

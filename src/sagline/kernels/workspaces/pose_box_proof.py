@@ -1,8 +1,8 @@
 """Proofs that all poses of a box are wrench-feasible, or that all are infeasible; docs/model.md, section 13.
 
-The proof of INSIDE is a rule for tensions within the limits that balance every wrench of the set at every pose. The
-proof of OUTSIDE is one wrench of the set and a direction that depends on the pose. Along this direction, all cables
-together contribute less than this wrench demands.
+The proof of INSIDE is a formula that gives, at every pose and for every wrench of the set, balancing tensions within
+the limits. The proof of OUTSIDE is one wrench of the set and a direction that depends on the pose. Along this
+direction, all cables together contribute less than this wrench demands.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_load
 
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn
-ATTEMPTS = 3  # iterations between tensions and their limits, which the set of wrenches narrows
-BEYOND = 2.0  # smoothing per cable; a demand with a larger residual is infeasible
+ATTEMPTS = 3  # alternating computations of the tensions and of their limits, which the set of wrenches narrows
+BEYOND = 2.0  # smoothing per cable; a demand whose residual is larger is infeasible
 
 LoadTerms = tuple[Array, Array, Array, Array, Indices]  # Loads
 PrecisionTerms = tuple[float, float]  # Precision

@@ -1,8 +1,8 @@
 """Bounds of the sag forces within the chord tension limits, and of their changes with tension and platform end.
 
 The sag force of an inextensible cable is tau X (L/D) + tau sin phi (X coth X - 1) with X = wD/(2 tau). This module
-bounds its slopes in closed form. Stretch decreases the slopes with respect to position. It changes the slope with
-respect to tension by at most -wD/(2 EA); docs/model.md, section 13.
+bounds the slopes of the sag force in closed form. Stretch decreases the slopes with respect to position. Stretch
+changes the slope with respect to tension by at most -wD/(2 EA); docs/model.md, section 13.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
     for i in range(m):
         bands[LOW, i] = cables.low[i]
         bands[HIGH, i] = cables.high[i]
-        # first-order sag force, which is the same at every tension
+        # the first-order sag force, which does not depend on the tension
         bands[SAG_FORCE_LOW, i] = bands[SAG_FORCE_HIGH, i] = cables.sag_force[i]
         bands[SLOPE, i] = bands[UNDER, i] = bands[OVER, i] = 0.0
     if curves.model.code != codes.CATENARY:
@@ -59,11 +59,11 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
 
 @formula
 def _from_secant(cables: Cables, i: int, low: float, high: float) -> tuple[float, float]:
-    """Lower bound (<= 0) and upper bound (>= 0) of a sag force minus its secant between two chord tensions [N].
+    """Lower bound (<= 0) and upper bound (>= 0) [N] of sag force minus secant between the chord tensions `low`, `high`.
 
     The sag force of an inextensible cable is a sum of convex functions of the tension. Only the term wD/2 sin phi (X/3
     - ...) is concave if the platform end is below the frame end. The secant of 1/tau is above 1/tau by at most
-    (1/sqrt(low) - 1/sqrt(high))^2. Two million random cables with X <= 10 and e <= 10 confirmed the bounds.
+    (1/sqrt(low) - 1/sqrt(high))^2. The bounds held for two million random cables with X <= 10 and e <= 10.
     """
     half_weight = cables.half_weight[i]
     if half_weight == 0.0:
@@ -84,13 +84,13 @@ SMALL = 1e-3  # X below which series are used
 
 @formula
 def _sinh_ratio(x: float) -> float:
-    """Upper bound of sinh(x)/x. It is exact except for small x."""
+    """Upper bound of sinh(x)/x, exact except for small x."""
     return math.sinh(x) / x if x > SMALL else 1.0 + x * x / 3.0
 
 
 @formula
 def _slack_rate(x: float) -> float:
-    """Upper bound of x cosh x - sinh x. It is exact except for small x."""
+    """Upper bound of x cosh x - sinh x, exact except for small x."""
     return x * math.cosh(x) - math.sinh(x) if x > 0.1 else 0.34 * x * x * x
 
 
@@ -102,9 +102,9 @@ def has_sag(curves: Curves, i: int) -> bool:
 
 @kernel
 def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float:
-    """Largest derivative of a sag force with respect to the platform end's position [N/m], above a given chord tension.
+    """Largest derivative [N/m] of a sag force by the position of the platform end, at all tensions >= `tension`.
 
-    way: largest distance of the platform end from its position in `curves` [m]; tension: lower bound of the chord
+    `way`: largest distance of the platform end from its position in `curves` [m]. `tension`: lower bound of the chord
     tension [N].
     """
     cables = curves.cables

@@ -3,7 +3,7 @@
 The margin is the least signed distance between the set and the facets of the available wrench set; docs/model.md,
 section 13. The sag forces depend on the tensions, which vary within their limits. The least favorable sag forces give a
 lower bound of the margin, and the most favorable sag forces give an upper bound. The value between the bounds uses the
-sag forces at the tension limits. It is continuous in the pose.
+sag forces at the tension limits, and is continuous in the pose.
 
 Source:
     Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of wrenches";
@@ -13,7 +13,6 @@ Source:
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
@@ -30,6 +29,20 @@ from sagline.kernels.statics import Platform, fill_structure_matrix, is_rotation
 from sagline.kernels.workspaces import sag_force_bounds as sag
 from sagline.kernels.workspaces import wrench_set
 from sagline.kernels.workspaces.exact_margin import ABOVE, BELOW, VALUE, LimitingFacet, settle_margin
+from sagline.kernels.workspaces.facet_bounds import (
+    ABOVE_SECANT,
+    BELOW_SECANT,
+    COLUMN,
+    COUNT_ROWS,
+    LEVER_X,
+    LEVER_Y,
+    WIDTH,
+    Bounds,
+    FacetWeights,
+    fill_bounds,
+    measure_bounds,
+    new_bounds,
+)
 from sagline.kernels.workspaces.facets import (
     DEPENDENT,
     LIMIT,
@@ -39,32 +52,24 @@ from sagline.kernels.workspaces.facets import (
     Facets,
     choose_basis,
     new_facets,
-    next_subset,
+    next_subsets,
 )
 
 # rounding error of the product of a normal with a column in its facet, relative to the terms of the product
 ALONG = 1e-13
-# relative to the same terms; if the product with a secant is smaller, the secant counts as part of the facet
+# a secant counts as part of the facet if its product with the normal is smaller, relative to the terms of the product
 IN_PLANE = 1e-10
-PURE = 1e-9  # a unit normal (moments times lever arm) whose force part is smaller counts as a pure moment
-
-# Rows of the cables' weights (COUNT_ROWS, m).
-WIDTH = 0  # half the range of the tensions
-BELOW_SECANT, ABOVE_SECANT = 1, 2  # least and largest difference of the sag force from its secant
-LEVER_X, LEVER_Y = 3, 4
-COLUMN = 5  # wrench of the secant per newton of chord tension, six rows
-COUNT_ROWS = 11
+PURE = 1e-9  # a unit normal (moments times lever arm) with a smaller force part counts as a pure moment
 
 # Facets that are measured together: rows in flat memory. Loops over facets vectorize, because the positions of the rows
 # are known at compile time.
 TOGETHER = 64
-OF_A_SUBSET = 20  # largest number of normals per subset, 6 over 3
 NORMAL = 0  # six rows
 ROUNDING = 6 * TOGETHER
 BY_ENDS = 7 * TOGETHER  # half ranges of the cables' wrenches
 # largest decrease and increase of the wrenches because the sag forces differ from their secants
 DECREASE, INCREASE = 8 * TOGETHER, 9 * TOGETHER
-IN_FACET = 2 * TOGETHER  # the same quantities for cables whose secants are in the facet, two rows further
+IN_FACET = 2 * TOGETHER  # two rows further: the same quantities for cables whose secants are in the facet
 AGAINST, FOR = 12 * TOGETHER, 13 * TOGETHER  # extent of the set in both directions of the normal
 # largest contributions of cables without upper limit, in both directions of the normal
 UP, DOWN = 14 * TOGETHER, 15 * TOGETHER
@@ -75,20 +80,15 @@ FACET_SIZE = 22 * TOGETHER
 AS_GOOD_AS_INFINITE = 1e250
 BEYOND = 1e300  # inverse of the length zero; products with this number count as infinite
 
+
+def margin_memory(n: int, m: int) -> int:
+    """Numbers of `signed_margins` for n free motions and m cables, in addition to the memory of a kernel."""
+    # Python calls this function; it cannot call `most_subsets`, which numba compiles for other kernels only
+    return FACET_SIZE + ((1 << n) + 1) * max(math.comb(m - n, k) for k in range(4))
+
+
 MarginMemory = tuple[Array, Indices, Codes]
 Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 6), cables (N,), statuses (N,)
-
-
-class _FacetWeights(NamedTuple):
-    """Weights of the facets of one pose."""
-
-    rows: Array  # rows of the cables' weights, (COUNT_ROWS, m)
-    middle: Array  # wrench of the cables at the middle of their secants minus the demand, (6,)
-    high: Array  # upper limits [N], (m,)
-    endless: bool  # True if a cable has no upper limit
-    curved: bool  # True if a sag force differs from its secant
-    arm: float  # lever arm of the norm [m]
-    lever: float  # mean lever arm [m] that divides moments in the search for normals; 1 without a lever arm
 
 
 @entry
@@ -114,7 +114,7 @@ def signed_margins(
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
-        memory: Two times the work arrays from `memory_for`, FACET_SIZE numbers, and codes of the cables (m,).
+        memory: Two times the work arrays from `memory_for`, `margin_memory` numbers, and codes of the cables (m,).
         margins: Filled with value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in
             world axes, of length 1 with moments divided by the lever arm, (N, 6); index of the cable whose limit has
             the largest effect on the value, or -1, (N,); status from the two bounds, (N,).
@@ -128,6 +128,7 @@ def signed_margins(
     count, m, n = poses.shape[0], robots.shape[1], freedom.shape[0]
     cables, rest = new_cables(Memory(memory[0], memory[1]), m, robots_have_machine(robots))
     facets, rest = new_facets(rest, n, m)
+    bounds, rest = new_bounds(rest, n, m)
     wrenches, rest = wrench_set.new_set(set_terms, rest)
     rotation, rest = block(rest, 3, 3)
     found, rest = vector(rest, 3)
@@ -150,7 +151,8 @@ def signed_margins(
         fill_structure_matrix(geometry, counted[COLUMN:])
         lever = arms[1][p * arms[1].size // count]
         _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
-        if not choose_basis(facets, n, m, lever):
+        straight = model.code == codes.STRAIGHT
+        if not choose_basis(facets, n, m, lever, straight):
             statuses[p] = codes.MARGIN_SINGULAR
             continue
         curves, left = new_curves(model, cables, memory[2], rest)
@@ -164,13 +166,13 @@ def signed_margins(
             continue
         wrench_set.place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
         endless, curved = _fill_weights(body, set_terms[0], geometry, bands, counted, middle)
-        if curved:
+        if not straight:
             _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
-            choose_basis(facets, n, m, lever)
-        counts = _FacetWeights(
+            choose_basis(facets, n, m, lever, True)
+        counts = FacetWeights(
             counted, middle, bands[sag.HIGH], endless, curved, arms[0][p * arms[0].size // count], lever
         )
-        _measure_all_facets(facets, n, m, counts, wrenches, measured, found, directions[p])
+        _measure_all_facets(facets, bounds, m, counts, wrenches, measured, found, directions[p])
         limiting[p] = _limiting_cable(counts, directions[p]) if found[VALUE] < math.inf else -1
         statuses[p] = _margin_status(found)
         if curved and statuses[p] == codes.MARGIN_OPEN:
@@ -239,29 +241,50 @@ def _fill_weights(
 @glue
 def _measure_all_facets(
     facets: Facets,
-    n: int,
+    bounds: Bounds,
     m: int,
-    counts: _FacetWeights,
+    counts: FacetWeights,
     wrenches: wrench_set.WrenchSetArrays,
     measured: Array,
     margin: Array,
     direction: Array,
 ) -> None:
-    """Fill the margin over all facets (3,), and the normal of the facet with the least value (6,)."""
+    """Fill the margin over all facets (3,), and the normal of the facet with the least value (6,).
+
+    As soon as the first facets are measured, bounds exclude most of the others.
+    """
     margin[:] = math.inf
     facets.minors[0, 0] = 1.0
-    depth = 0
-    held = 0
+    n, size, count, c, held = facets.basis.size, 0, 1, 0, 0
+    s, slack, limit = START[n, 1], math.inf, math.inf
     for _ in range(LIMIT):
-        for s in range(START[n, depth + 1], START[n, depth + 2]):
-            if _add_normal(facets, depth, ORDER[n, s], m, measured, held):
-                held += 1
-        depth = next_subset(facets, n, depth)
-        if depth < 0 or held > TOGETHER - OF_A_SUBSET:
+        for t in range(s, START[n, size + 2]):
+            s = t
+            if c == 0:
+                limit = margin[VALUE] + slack
+                if limit < math.inf:
+                    measure_bounds(facets.minors, ORDER[n, s], size + 1, count, limit, bounds)
+            first, c = c, 0
+            for b in range(first, count):
+                if limit < math.inf and bounds.excess[b] > 0.0:
+                    continue
+                if _add_normal(facets, size, ORDER[n, s], b, m, measured, held):
+                    held += 1
+                    if held == TOGETHER:
+                        c = b + 1
+                        break
+            if c > 0:
+                break
+        if c == 0:
+            size, count = next_subsets(facets, n, size)
+            s = START[n, size + 1]
+        if c > 0 or size < 0:
             _measure_facets(counts, wrenches, held, measured, margin, direction)
             held = 0
-        if depth < 0:
-            break
+            if size < 0:
+                break
+            if slack == math.inf and counts.arm > 0.0:
+                slack = fill_bounds(facets, m, counts, wrenches, bounds.terms)
     margin[BELOW] = min(margin[BELOW], margin[VALUE])  # true except for rounding errors
     margin[ABOVE] = max(margin[ABOVE], margin[VALUE])
     for k in range(3):
@@ -270,16 +293,15 @@ def _measure_all_facets(
 
 
 @formula
-def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
-    """Fill the normal from `rows`, one more than the present subset has columns. False if the normal is zero."""
-    minors = facets.minors[depth]
+def _add_normal(facets: Facets, size: int, rows: int, c: int, m: int, measured: Array, b: int) -> bool:
+    """Fill the normal from `rows` and the subset `c` of `size` columns, one less. False if the normal is zero."""
     x = y = z = u = v = w = 0.0
     sign = 1.0
     largest = 0.0
     rounding = 0.0
-    for j in range(depth + 1):
+    for j in range(size + 1):
         k = MEMBERS[rows, j]
-        factor = sign * minors[rows ^ (1 << k)]
+        factor = sign * facets.minors[rows ^ (1 << k), c]
         sign = -sign
         row = facets.table[k, m:]
         x += factor * row[0]
@@ -302,7 +324,7 @@ def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, 
 
 @kernel
 def _measure_facets(
-    counts: _FacetWeights,
+    counts: FacetWeights,
     wrenches: wrench_set.WrenchSetArrays,
     held: int,
     measured: Array,
@@ -333,8 +355,8 @@ def _measure_facets(
 
 
 @glue
-def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
-    """Fill half the ranges of the cables' wrenches along the stored normals, and their changes due to secant errors."""
+def _sum_cables(counts: FacetWeights, held: int, measured: Array) -> None:
+    """Along the stored normals, fill half the ranges of the cables' wrenches, and the changes due to secant errors."""
     rows = counts.rows
     for b in range(held):
         measured[BY_ENDS + b] = 0.0
@@ -375,7 +397,7 @@ def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
 
 
 @glue
-def _measure_lengths(counts: _FacetWeights, held: int, measured: Array) -> None:
+def _measure_lengths(counts: FacetWeights, held: int, measured: Array) -> None:
     """Fill the inverse lengths of the stored normals."""
     arm, lever = counts.arm * counts.arm, counts.lever * counts.lever
     for b in range(held):
@@ -408,7 +430,7 @@ def _measure_sides(middle: Array, held: int, measured: Array) -> None:
 
 
 @glue
-def _write_normal(counts: _FacetWeights, measured: Array, normals: Array, b: int, direction: Array) -> None:
+def _write_normal(counts: FacetWeights, measured: Array, normals: Array, b: int, direction: Array) -> None:
     """Fill the unit normal (6,) of a stored facet, directed to its nearer side."""
     along = 0.0
     moment = 0.0
@@ -423,7 +445,7 @@ def _write_normal(counts: _FacetWeights, measured: Array, normals: Array, b: int
 
 
 @glue
-def _limiting_cable(counts: _FacetWeights, direction: Array) -> int:
+def _limiting_cable(counts: FacetWeights, direction: Array) -> int:
     """Index of the cable with the largest contribution along `direction`."""
     cable = -1
     most = 0.0

@@ -32,7 +32,7 @@ def dot6(a: Array, b: Array) -> float:
 
 @formula
 def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
-    """Extent of an ellipsoid from its center along the direction `against`."""
+    """Distance from the center of an ellipsoid to its farthest point along the direction `against`."""
     square = 0.0
     for k in range(6):
         along = dot6(axes[k], against)
@@ -132,7 +132,7 @@ def reach_of_set(
 ) -> None:
     """Fill the largest -y . w and the largest y . w [N] of the set for the first `count` normals y.
 
-    normals: y, (6, B); work: work array, (2, B); against: filled, (B,); along: filled, (B,).
+    `normals`: y, (6, B). `work`: work array, (2, B). `against`: filled, (B,). `along`: filled, (B,).
     """
     against[:count] = 0.0
     _add_segments(wrenches.own, normals, count, work[0], against)
@@ -148,7 +148,7 @@ def reach_of_set(
 
 @kernel
 def _add_segments(segments: Array, normals: Array, count: int, work: Array, total: Array) -> None:
-    """Add the extent of `segments` (S, 6) to both sides. Segments of zero length are skipped."""
+    """Add the extent of `segments` (S, 6) along each normal to `total`. Segments of zero length are skipped."""
     for s in range(segments.shape[0]):
         if _multiply(segments[s], normals, count, work):
             for b in range(count):
@@ -157,7 +157,7 @@ def _add_segments(segments: Array, normals: Array, count: int, work: Array, tota
 
 @kernel
 def _add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, total: Array) -> None:
-    """Add the extent of ellipsoids (E, 6, 6) to both sides."""
+    """Add the extent of `ellipsoids` (E, 6, 6) along each normal to `total`."""
     for e in range(ellipsoids.shape[0]):
         work[1, :count] = 0.0
         for j in range(6):
@@ -172,7 +172,7 @@ def _add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, 
 def _add_polytopes(
     corners: Array, sizes: Indices, sign: float, normals: Array, count: int, work: Array, total: Array
 ) -> None:
-    """Add the extent of polytopes in the directions of the normals, or in the opposite directions."""
+    """Add the extent of polytopes to `total`, along the normals or, if `sign` is -1, opposite to them."""
     first = 0
     for p in range(sizes.size):
         work[1, :count] = -math.inf
@@ -188,7 +188,7 @@ def _add_polytopes(
 
 @kernel
 def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
-    """Fill the scalar products of `wrench` (6,) and `normals` (6, B). For a zero wrench: False, without filling."""
+    """Fill the scalar products of `wrench` (6,) and `normals` (6, B). False, without filling, for a zero `wrench`."""
     some = False
     for k in range(6):
         part = wrench[k]
@@ -205,7 +205,7 @@ def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
 
 @kernel
 def worst_wrench(center: Array, wrenches: WrenchSetArrays, direction: Array, wrench: Array) -> bool:
-    """Fill the wrench w (6,) of the set with the largest -`direction` . w. True if the set has no other wrench."""
+    """Fill `wrench` (6,), the wrench w of the set with the largest -`direction` . w. True if no other wrench exists."""
     farthest(Loads(center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.sizes), direction, wrench)
     single = wrenches.segments.shape[0] == 0 and wrenches.ellipsoids.shape[0] == 0
     for p in range(wrenches.sizes.size):

@@ -24,7 +24,7 @@
       const text = String(Number(value.toPrecision(6)));
       range.value = placeOf(ends, value);
       if (range.getAttribute("aria-valuetext") !== text) range.setAttribute("aria-valuetext", text);
-      if (field !== document.activeElement || !field.dataset.edited) field.value = text;
+      if (field !== document.activeElement || field.dataset.edited === undefined) field.value = text;
     }
   };
   const type = ({ field, label, least, most }) => {

@@ -22,8 +22,8 @@ from sagline.viewer.features.tensions import TensionsFeature
 from sagline.viewer.features.timeline import TimelineFeature
 from sagline.viewer.page import Page
 
-# the order is that of the controls on the page and of updates; `State` and `History` are last, because they
-# require all controls
+# the order is that of the controls on the page and of updates; `StateFeature` and `HistoryFeature` are last, because
+# they need all controls
 FEATURES: Final[tuple[Callable[[Page], Feature | None], ...]] = (
     CalibrationFeature.of_page,
     ModesFeature,

@@ -22,7 +22,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.readout import color_key, html_block, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
 from sagline.viewer.server import chosen_by, toggle, typed
-from sagline.viewer.shapes import Ellipsoids, ball, readable
+from sagline.viewer.shapes import ball, error_ellipsoids, placed_balls, readable
 
 FIELD: Final = "Row of the log"
 LONGEST: Final = 20  # largest number of characters of a requested row
@@ -53,12 +53,6 @@ def bands(found: Calibration) -> Indices:
     return np.asarray((found.chi_squared_of_pose > limits).sum(axis=0)).astype(np.int64)
 
 
-def _key_text(counts: Indices) -> str:
-    """HTML of the color legend, with the number of poses per color."""
-    key = color_key((color, f"{name}: {count}") for color, name, count in zip(COLORS, NAMES, counts, strict=True))
-    return html_block(f"<b>Chi squared of the poses</b><br>{key}")
-
-
 def verdict_text(found: Calibration) -> str:
     """HTML of the status."""
     kind = "good" if found.status is CalibrationStatus.FOUND else "bad"
@@ -84,12 +78,6 @@ def parameters_text(found: Calibration) -> str:
     items = "".join(f"<li>{_direction_text(one)}</li>" for one in (*found.gauge, *found.cannot_tell_apart))
     remark = f"<b>Not observed, or weakly identifiable</b><ul>{items}</ul>" if items else ""
     return html_block(f"<table>{head}{rows}</table>{remark}")
-
-
-def _ellipsoids_text(factor: float, *, relative: bool) -> str:
-    """HTML of the meaning of the ellipsoids."""
-    but = ", without the common motion of all anchors" if relative else ""
-    return sentence(f"Ellipsoids: one standard error{but}, enlarged {factor:g} times; lines: change of the position.")
 
 
 def _outliers_text(found: Calibration, chosen: int | None) -> str:
@@ -154,7 +142,8 @@ class CalibrationFeature(Feature):
         self._found, self._go, self._size = found, page.go, shapes.size_of(found.robot)
         self._nodes, self._ball, self._later = Nodes(page.server.scene), ball(), page.later
         self._bands = bands(found)
-        factor = readable(self._anchors("frame_anchors", relative=False).radius, LARGE * self._size)
+        _, errors, _ = self._anchors("frame_anchors", relative=False)
+        factor = readable(errors, LARGE * self._size)
         self._largest = LARGEST * factor
         self._build_tab(page, factor)
         page.channel.on(TOPIC, lambda row, _: toggle(self._field, row))
@@ -182,7 +171,9 @@ class CalibrationFeature(Feature):
             self._ellipsoids_html = gui.add_html("")
             hint = "Click one to move the platform there."
             self._poses_wanted: Any = gui.add_checkbox("Poses of the log", True, hint=hint)
-            gui.add_html(_key_text(np.bincount(self._bands, minlength=len(COLORS)).astype(np.int64)))
+            rows = zip(COLORS, NAMES, np.bincount(self._bands, minlength=len(COLORS)), strict=True)
+            key = color_key((color, f"{name}: {count}") for color, name, count in rows)
+            gui.add_html(html_block(f"<b>Chi squared of the poses</b><br>{key}"))
             self._field: Any = gui.add_text(FIELD, "", hint="Number of a row; empty for none.")
             self._outliers_html = gui.add_html("")
             self._pose_html = gui.add_html("")
@@ -208,18 +199,20 @@ class CalibrationFeature(Feature):
             self._row = row
             self._follow_row(row)
 
-    def _anchors(self, which: summary.Anchors, *, relative: bool) -> Ellipsoids:
-        """Ellipsoids of the anchors `which`, of frame or platform; none if these anchors were not calibrated."""
-        points = getattr(self._found.robot, which)
+    def _anchors(self, which: summary.Anchors, *, relative: bool) -> tuple[Indices, Array, Array]:
+        """`error_ellipsoids` of the anchors `which`, of frame or platform; none if they were not calibrated."""
         covariance = summary.anchor_covariance(self._found.parameters, self._found.covariance, which)
         if covariance is None:
-            return Ellipsoids.of(points, np.zeros((len(points), 3, 3)))
+            return error_ellipsoids(np.zeros((0, 3, 3)))
         if relative:
-            covariance = summary.relative_covariance(points, covariance, which)
-        return Ellipsoids.of(points, np.einsum("kikj->kij", covariance))
+            covariance = summary.relative_covariance(getattr(self._found.robot, which), covariance, which)
+        return error_ellipsoids(np.einsum("kikj->kij", covariance))
 
     def _follow_ellipsoids(self) -> None:
-        wanted = (bool(self._relative.value), self._checked_factor()) if self._wanted.value else None
+        relative, factor = bool(self._relative.value), float(self._factor.value)
+        if self._wanted.value and not 1.0 <= factor <= self._largest:
+            raise InvalidValueError("Drawn ×", factor, f"1 to {self._largest:g}", "Type a factor.")
+        wanted = (relative, factor) if self._wanted.value else None
         if wanted == self._ellipsoids:
             return
         self._ellipsoids = wanted
@@ -228,29 +221,24 @@ class CalibrationFeature(Feature):
         if wanted is None:
             self._ellipsoids_html.content = ""
             return
-        relative, factor = wanted
         for which, parent in NODES.items():
             self._draw_ellipsoids(which, parent, factor, relative=relative)
-        self._ellipsoids_html.content = _ellipsoids_text(factor, relative=relative)
-
-    def _checked_factor(self) -> float:
-        """The scale of the errors."""
-        value = float(self._factor.value)
-        if not 1.0 <= value <= self._largest:
-            raise InvalidValueError("Drawn ×", value, f"1 to {self._largest:g}", "Type a factor.")
-        return value
+        but = ", without the common motion of all anchors" if relative else ""
+        text = f"Ellipsoids: one standard error{but}, enlarged {factor:g} times; lines: change of the position."
+        self._ellipsoids_html.content = sentence(text)
 
     def _draw_ellipsoids(self, which: summary.Anchors, parent: str, factor: float, *, relative: bool) -> None:
         """Draw the ellipsoids of the anchors `which`, with lines from the points before the calibration."""
-        some = self._anchors(which, relative=relative)
-        if not len(some.which):
+        known, errors, axes = self._anchors(which, relative=relative)
+        if not len(known):
             return
         points = getattr(self._found.robot, which)
         moved = points - getattr(self._found.before, which)
         if relative:
             moved = (summary.without_motion(points, which) @ moved.reshape(-1)).reshape(-1, 3)
-        ends = np.stack((some.middle - factor * moved[some.which], some.middle), axis=1)
-        self._draw_balls(f"{parent}/errors", some.middle, some.turn, some.drawn(factor), TRUTH, opacity=OPACITY)
+        ends = np.stack((points[known] - factor * moved[known], points[known]), axis=1)
+        turns, radii = placed_balls(factor * errors, axes)
+        self._draw_balls(f"{parent}/errors", points[known], turns, radii, TRUTH, opacity=OPACITY)
         self._nodes.lines(f"{parent}/moves", ends, TRUTH, TRACE_WIDTH)
 
     def _draw_balls(self, name: str, places: Array, turns: Array, scales: Array, colors: Any, **looks: Any) -> Any:

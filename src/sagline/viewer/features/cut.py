@@ -24,7 +24,7 @@ from sagline.viewer.player import PlayerState
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.server import finite_numbers
-from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.tension_scale import cables_text, force_unit
 
 PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # ends of the parts [s]; the first part is short and shown soon
 DURATION: Final = PARTS[-1]
@@ -72,7 +72,7 @@ def _outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
     ]
     slack = sorted({event.cable for event in simulation.events if event.kind == "slack" and event.cable is not None})
     if slack:
-        rows.append(("Slack", f"cable{'s' * (len(slack) > 1)} {', '.join(map(str, slack))}"))
+        rows.append(("Slack", cables_text(slack)))
     rows.append(("Damping", f"loss time {n(simulation.damping.loss_time, '.2g', 's')} of the cables, assumed"))
     if not whole:
         rows.append(("Simulated", f"{simulation.time[-1] - simulation.time[0]:.2f} s so far"))
@@ -82,10 +82,12 @@ def _outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
 class CutFeature(Feature):
     """A folder to choose a cable and cut it, and buttons to cut the marked one and to undo a cut."""
 
+    live = True
+
     def __init__(self, page: Page) -> None:
         """Build folder and buttons."""
         self._page, self._player, self._nodes = page, page.player, Nodes(page.server.scene)
-        self._task = BackgroundTask(page.later)
+        self._task: BackgroundTask = BackgroundTask(page.later)
         self._is_marked = False  # True if a cable is marked in the scene
         self._requested = self._playing = 0  # numbers of the last requested cut and of the played cut
         self._number = 0  # of the player, for the played cut
@@ -110,11 +112,6 @@ class CutFeature(Feature):
         for each in (button, self._button):
             each.on_click(lambda _: page.later(self.cut))
         page.channel.on(TOPIC, self._pick)
-
-    @property
-    def waiting(self) -> bool:
-        """True if a simulation is running."""
-        return self._task.busy
 
     def depends(self, view: View) -> Hashable:
         """The view while a cable is marked."""

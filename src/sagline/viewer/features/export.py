@@ -7,18 +7,18 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from math import atan, ceil, log10, tan
+from math import atan, ceil, log10
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import viser
-from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.writing import file_stem
 from sagline.robot.batch import pulleys_of
 from sagline.viewer import shapes
+from sagline.viewer.camera import Camera
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion, Played
@@ -52,7 +52,7 @@ def strip_of(view: View, *remarks: str) -> dict[str, Any]:
 PATIENCE: Final = 30.0  # longest wait for a picture [s]
 NAMES: Final = ("/names", "/platform/notice")  # nodes that pictures omit
 STATIC: Final = ("/hull", "/slice")  # nodes that do not change over time
-BORDER: Final = 1.06  # factor on the robot's size, for a margin
+BORDER: Final = 1.06  # factor on the size of the picture, for a margin around the robot
 SHAPES: Final = 0.8, 2.4  # smallest and largest ratio of width to height
 DEEPEST: Final = 950.0  # largest depth [m]: viser does not draw objects beyond 1000 m in requested pictures
 _FIRST: Final = 32  # size of the discarded first picture [px]
@@ -69,7 +69,7 @@ class Shot(NamedTuple):
     forward: float
 
     @classmethod
-    def of(cls, camera: viser.CameraHandle, low: Array, high: Array, width: int, height: int = 0) -> Shot:
+    def of(cls, camera: Camera, low: Array, high: Array, width: int, height: int = 0) -> Shot:
         """Picture of the visible part of the box from `low` to `high`, for any proportions of the client's window."""
         right, up, far, forward = _seen(camera, low, high)
         rows = height or round(width / float(np.clip(right / up, *SHAPES)))
@@ -77,18 +77,19 @@ class Shot(NamedTuple):
         return cls(rows, width, 2.0 * atan(slope), 2.0 * far * slope / rows, forward)
 
 
-def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, float, float, float]:
-    """Visible extents of a box, horizontal and vertical [slope], its distance, and the advance of the camera [m]."""
-    try:
-        eye = np.array(camera.position, dtype=np.float64).reshape(3)
-        edge = tan(0.5 * float(camera.fov)) * np.array([float(camera.aspect), 1.0])
-        corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-        place = _turn(camera).inv().apply(corners - eye)
-        if not (np.isfinite(place).all() and np.all((edge > 0.01) & (edge < 100.0))):
-            raise ValueError(edge)
-    except (TypeError, ValueError, ZeroDivisionError):
+def _camera_of(client: viser.ClientHandle) -> Camera:
+    """Camera of a client; an unknown or extreme camera is refused."""
+    camera = Camera.of(client.camera)
+    if camera is None or not np.all((camera.reach > 0.01) & (camera.reach < 100.0)):
         step = "Reload the page."
-        raise InvalidValueError("camera", "not known", "a position, a direction and a field of view", step) from None
+        raise InvalidValueError("camera", "not known", "a position, a direction and a field of view", step)
+    return camera
+
+
+def _seen(camera: Camera, low: Array, high: Array) -> tuple[float, float, float, float]:
+    """Visible extents of a box, horizontal and vertical [slope], its distance, and the advance of the camera [m]."""
+    corners, edge = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T, camera.reach
+    place = (corners - camera.place) @ camera.axes
     depth = place[:, 2]
     far, forward = float(depth.mean()), max(0.0, float(depth.max()) - DEEPEST)
     if depth.min() <= forward:  # part of the box is behind the camera
@@ -96,11 +97,6 @@ def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, f
     reach, nearer = (np.abs(place[:, :2] / (depth - nearer)[:, None]).max(axis=0) for nearer in (0.0, forward))
     right, up = (nearer * np.minimum(1.0, edge / reach)).tolist()  # the part within the window
     return right, up, far - forward, forward
-
-
-def _turn(camera: viser.CameraHandle) -> Rotation:
-    """Rotation from a camera's axes (right, down and forward) to the world axes."""
-    return Rotation.from_quat(np.array(camera.wxyz, dtype=np.float64).reshape(4), scalar_first=True)
 
 
 Show: TypeAlias = Callable[[View], None]  # draws a view
@@ -125,9 +121,9 @@ def offscreen_scene(
             scene.show(view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
 
     def take(kind: Literal["png", "jpeg"], height: int = shot.height, width: int = shot.width) -> None:
-        camera = client.camera
-        place = camera.position + shot.forward * _turn(camera).apply([0.0, 0.0, 1.0])
-        looks: dict[str, Any] = {"wxyz": camera.wxyz, "position": place, "fov": shot.field}
+        camera = _camera_of(client)
+        place = camera.place + shot.forward * camera.axes[:, 2]
+        looks: dict[str, Any] = {"wxyz": client.camera.wxyz, "position": place, "fov": shot.field}
         client.get_render(height, width, transport_format=kind, timeout=PATIENCE, **looks)
 
     snapshot = view.snapshot
@@ -147,7 +143,7 @@ def offscreen_scene(
         client.scene.reset()
 
 
-WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # size of a picture [px]
+WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # size of a film and of its text [px]
 RATE = 30.0  # pictures of a film per second
 LONGEST = 120.0  # longest film [s]; a longer one would fill the memory of a browser
 LINE_WIDTH = 1.4  # line width relative to that on the screen
@@ -195,7 +191,12 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     _add(scene, "platform", shapes.platform_solid(robot), PLATFORM if snapshot.solved else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
     for i, course in enumerate(snapshot.courses(sag_scale)):
-        _add(scene, f"cable {i}", shapes.tube(course, _CABLE_RADIUS * shapes.size_of(robot)), tuple(colors[i]))
+        gaps = np.flatnonzero(np.isnan(course[:, 0]))
+        for piece in np.split(course, gaps):
+            known = piece[np.isfinite(piece[:, 0])]
+            if len(known) > 1:
+                tube = shapes.tube(known, _CABLE_RADIUS * shapes.size_of(robot))
+                _add(scene, f"cable {i}", tube, tuple(colors[i]))
     scene.apply_transform(_Z_UP_TO_Y_UP)
     glb: bytes = scene.export(file_type="glb")
     return glb
@@ -284,7 +285,7 @@ class ExportFeature(Feature):
         width, dots = paper
         text = LETTERS * dots / 72.0
         beneath = round(STRIP * text) if self._strip.value else 0
-        shot = Shot.of(client.camera, *self._page.extent, round(width * dots))
+        shot = Shot.of(_camera_of(client), *self._page.extent, round(width * dots))
         about = {
             **strip_of(view), "name": self._name(), "dots": dots, "text": text, "strip": beneath,
             "width": shot.width, "height": shot.height + beneath,
@@ -316,7 +317,7 @@ class ExportFeature(Feature):
             **strip_of(view, played.name, *pace), "name": f"{self._name()}-{played.name}", "count": len(times),
             "rate": RATE, "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
         }  # fmt: skip
-        shot = Shot.of(client.camera, *self._page.extent, WIDTH, HEIGHT - strip)
+        shot = Shot.of(_camera_of(client), *self._page.extent, WIDTH, HEIGHT - strip)
         send(CLOCK, None)  # pictures without a clock do not belong to the film
         send(TOPIC, about)
         try:

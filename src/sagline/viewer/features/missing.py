@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from html import escape
 from typing import Any, Final
 
@@ -22,7 +23,7 @@ from sagline.viewer.readout import definitions, html_block
 from sagline.viewer.robot_scene import INFEASIBLE, Nodes
 from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import Snapshot, method_name
-from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
+from sagline.viewer.tension_scale import ForceUnit, cables_text, force_unit, number_text
 
 GO: Final = "go-there"  # topic of the button that moves the platform to the nearest pose
 NEGLIGIBLE: Final = 1e-9  # smaller moments, relative to the force at an arm of one meter, count as zero
@@ -64,11 +65,9 @@ def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str,
             ("with moment", f"{_moment(missing)}: {turning} N m about x, y, z through the center of mass"),
         ]
     for lower in (True, False):
-        cables = [str(cable) for cable, at_lower in missing.limits.items() if at_lower is lower]
+        cables = [cable for cable, at_lower in missing.limits.items() if at_lower is lower]
         if cables:
-            rows.append(
-                (f"At {'lower' if lower else 'upper'} limit", f"cable{'s'[: len(cables) - 1]} {', '.join(cables)}")
-            )
+            rows.append((f"At {'lower' if lower else 'upper'} limit", cables_text(cables)))
     return rows
 
 
@@ -95,9 +94,9 @@ def _moment(missing: MissingWrench) -> str:
     return n(float(np.linalg.norm(missing.moment)), ".4g", "N m")
 
 
-FEASIBLE: Final = (28, 140, 92)  # opacity of the platform at the nearest feasible pose
-WIDTH, LINE_WIDTH = 5.0, 2.0  # width of its lines [px]
-SMALL: Final = 0.8  # size relative to other labels
+FEASIBLE: Final = (28, 140, 92)  # color of the platform at the nearest feasible pose
+WIDTH, LINE_WIDTH = 5.0, 2.0  # widths of the cables at limits, and of the line to the nearest pose [px]
+SMALL: Final = 0.8  # text size, relative to other labels
 LONG: Final = 0.2  # length of the arrow, as a share of the robot's size
 _ARROW: Final = np.array([0.006, 0.014, 0.04])  # radii of shaft and head, length of the head, per size of the robot
 ALONG: Final = (0.32, 0.44, 0.56)  # positions of labels, as shares of a cable from its anchor; different for neighbors
@@ -108,27 +107,28 @@ Key = tuple[object, ...]
 class MissingFeature(Feature):
     """Text and drawing of the missing force, the cables at limits and the nearest feasible pose."""
 
+    live = True
+
     def __init__(self, page: Page) -> None:
         """Begin without a drawing."""
         self._page, self._panel, self._nodes = page, page.panel, Nodes(page.server.scene)
         self._body = shapes.platform_solid(page.robot)
-        self._task = BackgroundTask(page.later)
+        self._task: BackgroundTask = BackgroundTask(page.later)
         self._key: Key = ()  # key of the shown pose; () while it is feasible
-        self._found: tuple[Key, NearestFeasible | None] = ((), None)
+        self._nearest: NearestFeasible | None = None  # nearest feasible pose of the key below
+        self._nearest_key: Key = ()  # () before the first computation
         self._shown: tuple[Snapshot, View] | None = None
         page.channel.on(GO, self._go)
 
-    @property
-    def waiting(self) -> bool:
-        """True while the nearest feasible pose is computed."""
-        return self._task.busy
+    def depends(self, view: View) -> Hashable:
+        """Key: the view at an infeasible pose."""
+        return view if isinstance(view.snapshot, Snapshot) and not view.snapshot.feasible else None
 
     def follow(self, view: View) -> None:
         """Explain an infeasible pose. At a feasible pose, remove the explanation."""
         snapshot = view.snapshot
         if not isinstance(snapshot, Snapshot) or snapshot.feasible:
-            if self._key:
-                self._clear()
+            self._clear()
             return
         self._draw_force(snapshot, view.missing)
         self._draw_limits(snapshot, view.missing)
@@ -137,7 +137,7 @@ class MissingFeature(Feature):
         pose = snapshot.pose
         self._key = (id(snapshot.robot), type(model), pose.position.tobytes(), pose.quaternion.tobytes(), load)
         self._shown = snapshot, view
-        if not self._task.busy and self._found[0] != self._key:
+        if not self._task.busy and self._nearest_key != self._key:
             self._search()
         self._explain()
 
@@ -149,7 +149,7 @@ class MissingFeature(Feature):
 
         def done(found: NearestFeasible | None) -> None:
             if self._key:
-                self._found = (key, found)
+                self._nearest_key, self._nearest = key, found
                 self._explain()
                 if self._key != key:
                     self._search()
@@ -161,8 +161,8 @@ class MissingFeature(Feature):
     def _explain(self) -> None:
         """Write the explanation, and draw the nearest feasible pose; until it is computed, draw the previous one."""
         assert self._shown is not None
-        (snapshot, view), nearest = self._shown, self._found[1] if self._found[0] else None
-        searching = self._found[0] != self._key
+        (snapshot, view), nearest = self._shown, self._nearest
+        searching = self._nearest_key != self._key
         self._panel.explain(explanation(snapshot, view.missing, nearest, searching=searching))
         nodes = self._nodes
         if nearest is None:
@@ -203,16 +203,16 @@ class MissingFeature(Feature):
             nodes.label(f"/limits_names/{k}", name, place, "top-left", SMALL)
 
     def _clear(self) -> None:
-        self._key, self._found = (), ((), None)
+        self._key = self._nearest_key = ()
+        self._nearest = None
         self._panel.explain("")
         self._nodes.remove("/limits_names")
         self._nodes.hide("/missing", "/missing_name", "/limits", "/nearest", "/nearest_way")
 
     def _go(self, _value: Any, _client: int) -> None:
         """Go to the nearest feasible pose."""
-        key, nearest = self._found
-        if key and key == self._key and nearest is not None:
-            self._page.go(nearest.pose)
+        if self._nearest is not None and self._nearest_key == self._key:
+            self._page.go(self._nearest.pose)
 
 
 def _load(snapshot: Snapshot, view: View) -> tuple[CableModel, Array | None]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.dynamics.vibration.response import MOTIONS, ResponseCurves, response_curves
+from sagline.dynamics.vibration.response import MOTIONS, ResponseCurves
 from sagline.dynamics.vibration.vibration import (
     MASSLESS,
     ListedMode,
@@ -152,7 +152,8 @@ class ModesFeature(Feature):
 
     def __init__(self, page: Page) -> None:
         """Build the tab."""
-        self._scene, self._task = page.scene, BackgroundTask(page.later)
+        self._scene = page.scene
+        self._task: BackgroundTask = BackgroundTask(page.later)
         self._key: Hashable = None
         self._state: Equilibrium | None = None
         self._due: float | None = None  # time at which the computation of modes starts [s]
@@ -246,7 +247,7 @@ class ModesFeature(Feature):
                     self._curves[force] = curves
                     self._choose(vibration)
 
-            self._task.start(lambda: response_curves(vibration, force), receive, self._refuse)
+            self._task.start(lambda: ResponseCurves.of_vibration(vibration, force), receive, self._refuse)
         return self._curves.get(force)
 
     def _choose(self, vibration: Vibration) -> None:

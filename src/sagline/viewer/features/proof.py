@@ -29,8 +29,7 @@ class _PlatformForce:
 
     name: str  # number of its cable, or "weight", "load" or "missing"
     color: Color  # color of its cable, or a color of its own
-    force: Array  # world axes [N], shape (3,)
-    moment: Array  # moment about the center of mass, world axes [N m], shape (3,)
+    wrench: Array  # force, and moment about the center of mass, world axes [N, N m], shape (6,)
     at: Array  # point at which it acts [m], shape (3,)
 
 
@@ -50,22 +49,21 @@ def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tupl
     ends = pose.transform(robot.platform_anchors)
     pulls = forces_of_cables(state)
     order = np.argsort(np.arctan2(pulls[:, 1], pulls[:, 0]), kind="stable").tolist()
-    moments = np.cross(ends - center, pulls)
-    forces = [_PlatformForce(str(k), cable_color(k), pulls[k], moments[k], ends[k]) for k in order]
-    weight = np.array([0.0, 0.0, -robot.mass * robot.gravity])
-    forces.append(_PlatformForce(WEIGHT, WEIGHT_COLOR, weight, np.zeros(3), center))
+    wrenches = np.hstack((pulls, np.cross(ends - center, pulls)))
+    forces = [_PlatformForce(str(k), cable_color(k), wrenches[k], ends[k]) for k in order]
+    weight = np.array([0.0, 0.0, -robot.mass * robot.gravity, 0.0, 0.0, 0.0])
+    forces.append(_PlatformForce(WEIGHT, WEIGHT_COLOR, weight, center))
     lacking = np.zeros(6) if missing is None else missing
     for name, color, wrench in ((LOAD, LOAD_COLOR, state.wrench - lacking), (MISSING, MISSING_COLOR, lacking)):
         if np.linalg.norm(wrench) > 0.0:
-            forces.append(_PlatformForce(name, color, wrench[:3], wrench[3:], center))
+            forces.append(_PlatformForce(name, color, wrench, center))
     return tuple(forces)
 
 
 def residual(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> tuple[float, float]:
     """Residual of the force balance along the free motions: magnitudes of force [N] and moment [N m]."""
-    whole = np.concatenate((sum(each.force for each in forces), sum(each.moment for each in forces)))
     freedom = state.one_robot.freedom
-    rest = freedom.T @ (freedom @ whole)
+    rest = freedom.T @ (freedom @ sum(each.wrench for each in forces))
     return float(np.linalg.norm(rest[:3])), float(np.linalg.norm(rest[3:]))
 
 
@@ -98,7 +96,7 @@ def _overlap(one: Label, other: Label) -> float:
 def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> str:
     """HTML of the force polygon in two projections, its residual, and the forces and moments as numbers."""
     forces = forces_on_platform(state, missing)
-    corners = np.vstack((np.zeros(3), np.cumsum([each.force for each in forces], axis=0)))
+    corners = np.vstack((np.zeros(3), np.cumsum([each.wrench[:3] for each in forces], axis=0)))
     views = [("xyz"[right] + "xyz"[up], corners[:, [right, up]]) for right, up in SIDES]
     areas = [float(np.prod(np.ptp(points, axis=0))) for _, points in views]
     shown = np.sort(np.argsort(areas)[::-1][:SHOWN])
@@ -183,32 +181,19 @@ def _residual_text(state: Equilibrium, forces: tuple[_PlatformForce, ...], missi
 
 def _table(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> str:
     unit, turning = force_unit(state.one_robot), _can_rotate(state)
-    decimals = _decimals(max(float(np.abs(each.force).max()) for each in forces) / unit.newtons)
-    head = "".join(f"<th>F<sub>{axis}</sub></th>" for axis in "xyz")
-    head += "".join(f"<th>M<sub>{axis}</sub></th>" for axis in "xyz") if turning else ""
-    head = f"<tr><th>[{unit.name}{f', {unit.name} m' if turning else ''}]</th>{head}</tr>"
+    largest = max(float(np.abs(each.wrench[:3]).max()) for each in forces) / unit.newtons
+    decimals = 1 if largest >= 99.95 else 2 if largest >= 9.995 else 3  # limited by the width of the table
+    columns = [f"{letter}<sub>{axis}</sub>" for letter in ("FM" if turning else "F") for axis in "xyz"]
+
+    def cells(wrench: Array) -> str:
+        numbers = wrench[: len(columns)] / unit.newtons
+        return "".join(f"<td>{number_text(number, f'.{decimals}f')}</td>" for number in numbers)
+
+    head = "".join(f"<th>{name}</th>" for name in (f"[{unit.name}{f', {unit.name} m' if turning else ''}]", *columns))
     numbered = sorted(forces, key=lambda each: (not each.name.isdigit(), int(each.name) if each.name.isdigit() else 0))
-    rows = "".join(
-        f"<tr><td>{swatch(each.color)}{each.name}</td>"
-        + _cells(each.force / unit.newtons, each.moment / unit.newtons, decimals, turning=turning)
-        + "</tr>"
-        for each in numbered
-    )
-    force = np.sum([each.force for each in forces], axis=0) / unit.newtons
-    moment = np.sum([each.moment for each in forces], axis=0) / unit.newtons
-    whole = _cells(force, moment, decimals, turning=turning)
-    return f'<table class="forces">{head}{rows}<tr class="sum"><td>sum</td>{whole}</tr></table>'
-
-
-def _decimals(largest: float) -> int:
-    """Number of decimals for a largest force, limited by the width of the table."""
-    return 1 if largest >= 99.95 else 2 if largest >= 9.995 else 3
-
-
-def _cells(force: Array, moment: Array, decimals: int, *, turning: bool) -> str:
-    parts = np.concatenate((force, moment)) if turning else force
-    cells = [number_text(part, f".{decimals}f") for part in parts]
-    return "".join(f"<td>{cell}</td>" for cell in cells)
+    rows = "".join(f"<tr><td>{swatch(each.color)}{each.name}</td>{cells(each.wrench)}</tr>" for each in numbered)
+    total = cells(np.sum([each.wrench for each in forces], axis=0))
+    return f'<table class="forces"><tr>{head}</tr>{rows}<tr class="sum"><td>sum</td>{total}</tr></table>'
 
 
 LONG: Final = 0.22  # length of the longest arrow in the scene, as a share of the robot's size
@@ -241,14 +226,11 @@ class ProofFeature(Feature):
             self._html.content = sentence(NOT_AT_REST if not isinstance(view.snapshot, Snapshot) else UNKNOWN)
         else:
             self._html.content = force_polygon_figure(state, missing)
-        self._draw(state if self._wanted.value else None, missing)
-
-    def _draw(self, state: Equilibrium | None, missing: Array | None) -> None:
-        """Draw the forces as arrows at their points of application."""
-        if state is None:
+        self.live = bool(self._wanted.value)  # arrows follow every view
+        if state is None or not self.live:
             self._nodes.hide("/forces")
             return
-        forces = forces_on_platform(state, missing)
-        scale = LONG * self._page.size / max(float(np.linalg.norm(each.force)) for each in forces)
-        ends = np.array([[each.at, each.at + scale * each.force] for each in forces])
-        self._nodes.arrows("/forces", ends, [each.color for each in forces], *(_ARROW * self._page.size))
+        forces, size = forces_on_platform(state, missing), self._page.size
+        scale = LONG * size / max(float(np.linalg.norm(each.wrench[:3])) for each in forces)
+        ends = np.array([[each.at, each.at + scale * each.wrench[:3]] for each in forces])
+        self._nodes.arrows("/forces", ends, [each.color for each in forces], *(_ARROW * size))

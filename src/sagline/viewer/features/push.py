@@ -7,12 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 import viser
-from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.reach import is_underconstrained
 from sagline.viewer import shapes
 from sagline.viewer.camera import OUTSIDE, Camera, camera_of, ray_distance
 from sagline.viewer.feature import Feature, View
@@ -22,7 +22,7 @@ from sagline.viewer.push import Push, PushResponse, Reserve, push_response, semi
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.server import finite_numbers
-from sagline.viewer.shapes import THINNEST, ball, readable
+from sagline.viewer.shapes import ball, placed_balls, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
 
 COLOR: Final = (200, 60, 130)  # color with a contrast of 3 : 1 on both backgrounds, different from platforms
@@ -40,13 +40,14 @@ LONGEST: Final = 0.6  # longest arrow of a typed force, as a share of the robot'
 
 def response_text(response: PushResponse, drawn_for: float | None) -> str:
     """HTML of a response. `drawn_for` is the force of the drawn ellipsoid [N]; None without an ellipsoid."""
-    unit = force_unit(response.state.one_robot)
+    robot = response.state.one_robot
+    unit, place = force_unit(robot), "position" if is_underconstrained(robot) else "pose"
     rows = [
         ("Force", unit.written(response.force)),
         ("Displacement", _motion_text(response)),
-        ("Tensions", _tensions(response, unit)),
+        ("Tensions", "–" if response.loaded is None else unit.span(response.loaded.limited_tension)),
         ("Fixed lengths", _reserve_text(response, response.reserve, unit)),
-        ("Redistributed", f"{_reserve_text(response, response.redistributed, unit)}, at the same pose"),
+        ("Redistributed", f"{_reserve_text(response, response.redistributed, unit)}, at the same {place}"),
         ("Compliance", _compliance_text(response, drawn_for)),
     ]
     within = response.loaded is not None and response.reserve.force >= response.force
@@ -70,13 +71,6 @@ def _reserve_text(response: PushResponse, reserve: Reserve, unit: ForceUnit) -> 
     return f"{unit.written(more)} more{limit}" if more >= 0.0 else f"{unit.written(-more)} beyond the limit{limit}"
 
 
-def _tensions(response: PushResponse, unit: ForceUnit) -> str:
-    if response.loaded is None:
-        return "–"
-    tension = response.loaded.limited_tension
-    return f"{unit.bare(tension.min())} to {unit.written(tension.max())}"
-
-
 def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
     if not np.isfinite(response.compliance).all():
         return "unlimited: no cable resists a motion in some direction"
@@ -87,6 +81,8 @@ def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
 
 class PushFeature(Feature):
     """A folder with the fields of a typed or dragged force, and the response in the scene."""
+
+    live = True
 
     def __init__(self, page: Page) -> None:
         """Build the folder."""
@@ -196,7 +192,7 @@ class PushFeature(Feature):
         self.response = None
 
     def _draw(self, response: PushResponse, error_scale: float, drawn_for: float | None) -> None:
-        """Draw force, reserve, the platform with the force, and the ellipsoid."""
+        """Draw the force, the largest force in its direction, the displaced platform and the ellipsoid of stiffness."""
         nodes, size, unit = self._nodes, self._size, force_unit(response.state.one_robot)
         start, arrow = response.state.pose.transform(response.push.at), response.push.force / self._stiffness
         if self._hold is None:
@@ -214,9 +210,9 @@ class PushFeature(Feature):
             nodes.hide("/gives_way")
             return
         lengths, directions = semi_axes(response.compliance)
-        wxyz, scale = _ellipsoid(drawn_for * lengths * directions)
+        (wxyz,), ((x, y, z),) = placed_balls(drawn_for * lengths[None], directions[None])
         looks: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "position": start}
-        nodes.mesh("/gives_way", *self._ball, COLOR, BALL_OPACITY, wxyz=wxyz, scale=scale, **looks)
+        nodes.mesh("/gives_way", *self._ball, COLOR, BALL_OPACITY, wxyz=wxyz, scale=(x, y, z), **looks)
 
     def _leave(self, client: int) -> None:
         """Release the force of a client that has disconnected."""
@@ -266,16 +262,6 @@ def _drag(camera: Camera, at: Array, start: Array) -> Array:
     """Vector (3,) [m] from `start`, a point in the world, to the picture point `at` at the same depth."""
     depth = float((start - camera.place) @ camera.axes[:, 2])
     return np.asarray(camera.place + depth * camera.ray(at) - start)
-
-
-def _ellipsoid(axes: Array) -> tuple[Array, tuple[float, float, float]]:
-    """Quaternion (scalar first) and scale of a unit ball for semi-axes (3, 3), with a minimum thickness."""
-    lengths = np.linalg.norm(axes, axis=0)
-    directions = axes / np.maximum(lengths, 1e-300)
-    if np.linalg.det(directions) < 0.0:
-        directions[:, 0] *= -1.0
-    x, y, z = np.maximum(lengths, THINNEST * lengths.max()).tolist()
-    return np.roll(Rotation.from_matrix(directions).as_quat(), 1), (x, y, z)
 
 
 def _numbers(value: Any, count: int, item: str, allowed: str) -> Array:

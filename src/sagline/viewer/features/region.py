@@ -11,6 +11,7 @@ from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
+from sagline.robot.reach import LEVEL, is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.viewer import workspace
 from sagline.viewer.feature import BackgroundTask, Feature, View
@@ -25,7 +26,7 @@ from sagline.workspaces.levels import Levels, Plane, slice_of
 from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
-BOUNDARY_WIDTH, LINE_WIDTH, LINE_COLOR = 4.0, 1.5, (120, 128, 138)  # line widths [px], and color
+BOUNDARY_WIDTH, LINE_WIDTH, LINE_COLOR = 4.0, 1.5, (120, 128, 138)  # widths of boundary and lines [px], color of lines
 _SMALL, _TEXT_SCALE = 0.7, 0.85  # text scale of labels on lines and of other labels
 INWARD, OUTWARD = REST, PLATFORM  # colors of arrows back to the workspace and to its boundary
 _BELOW: Final = 0.04  # distance from the platform to the text below it, as a share of the robot's size
@@ -39,7 +40,9 @@ PLANES: Final = {"level": 2, "upright, along x": 1, "upright, along y": 0}  # na
 _NOTHING: Final = sentence("Choose one or several of these.")
 
 
+# key of the workspace, True for the coarse hull, and the hull; None without one
 _Result = tuple[Hashable, bool, workspace.Hull | None]
+_NO_RESULT: Final[_Result] = (None, True, None)
 
 
 class _SupersededError(SaglineError):
@@ -55,10 +58,12 @@ def planes_of(robot: Robot) -> tuple[int, ...]:
 class RegionFeature(Feature):
     """A tab with loads and a choice of region, slice and free travel, which are drawn in the scene."""
 
+    live = True
+
     def __init__(self, page: Page) -> None:
         """Build the tab."""
         self._page, self._server, self._size, self._nodes = page, page.server, page.size, Nodes(page.server.scene)
-        self._task = BackgroundTask(page.later)
+        self._task: BackgroundTask = BackgroundTask(page.later)
         self._key: Hashable = None  # key of the workspace
         self._query: workspace.WorkspaceQuery | None = None
         self._levels: Levels | None = None
@@ -66,8 +71,7 @@ class RegionFeature(Feature):
         self._place = np.zeros(3)  # position of the platform [m]
         self._scale = MarginScale(1.0)
         self._scale_key: Hashable = None  # key of the workspace of the scale
-        # key of the workspace, True for the coarse hull, and the hull; None if it cannot be computed
-        self._result: _Result | None = None
+        self._result = _NO_RESULT
         self._hull_key: Hashable = None  # key of the drawn hull
         self._slice_key: Hashable = None  # key of the drawn slice
         self._progress = 0.0
@@ -95,11 +99,6 @@ class RegionFeature(Feature):
         page.refresh_on(
             self._force, self._moment, self._region_box, self._color, self._slice_box, self._plane, self._travel_box
         )
-
-    @property
-    def waiting(self) -> bool:
-        """True if a hull is being computed."""
-        return self._task.busy
 
     @property
     def _without(self) -> str:
@@ -174,9 +173,8 @@ class RegionFeature(Feature):
         center = np.zeros(6) if wrench is None else np.array(wrench)
         center += 0.0 if push is None else push.load(snapshot.robot, snapshot.pose)
         loads = WrenchBox(_load(self._force, "N"), _load(self._moment, "N m"), center)
-        return workspace.WorkspaceQuery(
-            snapshot.robot, locked(np.array(snapshot.pose.quaternion)), model, loads, broken
-        )
+        turn = LEVEL if is_underconstrained(snapshot.robot) else snapshot.pose.quaternion
+        return workspace.WorkspaceQuery(snapshot.robot, locked(np.array(turn)), model, loads, broken)
 
     def _prepare(self, query: workspace.WorkspaceQuery) -> tuple[Levels, Region]:
         """Levels and region, created again if the query has changed."""
@@ -199,14 +197,11 @@ class RegionFeature(Feature):
         """Draw the latest hull, and start the computation of a better one."""
         if not self._region_box.value:
             self._show_hull([])
-            self._hull_key = self._result = None
+            self._hull_key, self._result = None, _NO_RESULT
             return
-        result = self._result
-        if (result is None or result[0] != self._key or result[1]) and not self._task.busy:
-            self._compute(rough=result is None or result[0] != self._key)
-        if result is None:
-            return
-        known, rough, hull = result
+        known, rough, hull = self._result
+        if (known != self._key or rough) and not self._task.busy:
+            self._compute(rough=known != self._key)
         if hull is None:
             self._show_hull([])
             return
@@ -241,7 +236,7 @@ class RegionFeature(Feature):
             failed,
         )
 
-    def _receive(self, result: _Result | None) -> None:
+    def _receive(self, result: _Result) -> None:
         """Draw a result of the background task."""
         if self._region_box.value and self._key is not None:
             self._result = result
@@ -256,9 +251,12 @@ class RegionFeature(Feature):
             here = self._levels.details(self._place[None])
             text = workspace.margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
             text += self._without
-            if self._result is not None and (hull := self._result[2]) is not None:
+            *_, hull = self._result
+            if hull is not None:
                 patches = workspace.near_patches(hull, self._place, workspace.REACH * self._size)
-            self._margin_html.content = html_block(f"<b>Margin here</b>, force with moment: {text}")
+            few = is_underconstrained(self._levels.robot)
+            what = "tension to its nearest limit" if few else "force with moment"
+            self._margin_html.content = html_block(f"<b>Margin here</b>, {what}: {text}")
         with self._server.atomic():
             workspace.draw_patches(self._nodes, "/wall", patches)
             below = (0.0, 0.0, -_BELOW * self._size)
@@ -320,7 +318,8 @@ class RegionFeature(Feature):
         """Remove the drawing and the stored workspace."""
         self._nodes.remove("/hull", "/wall", "/slice", "/travel")
         self._nodes.hide("/platform/left")
-        self._hull_key = self._key = self._result = self._slice_key = None
+        self._hull_key = self._key = self._slice_key = None
+        self._result = _NO_RESULT
 
 
 def _scale_of(levels: Levels, region: Region) -> MarginScale:

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import fields
 from functools import partial
 from typing import Any, Final
+from urllib.parse import quote, urlencode
 
 import numpy as np
 
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.pose_text import STRONGEST, pose_of_text
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.methods import QuadraticProgram
 from sagline.viewer import link
@@ -132,7 +134,7 @@ class StateFeature(Feature):
         if isinstance(view.settings.tension, ByHand):
             controls.pop(SHARING, None)
             parts[HAND] = link.listed(np.asarray(view.settings.tension.target))
-        return link.link_text({**parts, **controls})
+        return urlencode({**parts, **controls}, safe=link.SAFE, quote_via=quote)
 
     def _open_link(self, text: str, client: int) -> None:
         """Bring the page and the camera of `client` to the state of a link. An invalid link changes nothing."""
@@ -188,7 +190,7 @@ def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
 
 
 def _changes(settings: Settings, robot: Robot) -> list[str]:
-    """Lines of Python for the changes of a robot by the settings."""
+    """Lines of Python that change a robot as the settings of the page do."""
     lines = [] if settings.mass == robot.mass else [_weighed(settings.mass)]
     factors = {"linear_density": settings.density, "axial_stiffness": settings.stiffness}
     changed = [f"    {name}=cables.{name} * {factor!r}," for name, factor in factors.items() if factor != 1.0]
@@ -205,7 +207,8 @@ def _planned(snapshot: Snapshot, view: View) -> list[str]:
     """Lines of Python for the plan of a pose."""
     settings, pose = view.settings, snapshot.pose
     made = [f"pose = sl.Pose.from_euler({_plain(pose.position)}, 0, 0, 0)"]
-    if np.any(pose.quaternion[:3] != 0.0):
+    underconstrained = is_underconstrained(snapshot.robot)  # its rotation is a result
+    if np.any(pose.quaternion[:3] != 0.0) and not underconstrained:
         angles = ", ".join(number_text(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
         made = [
             f"# alpha, beta, gamma = {angles} degrees",
@@ -213,7 +216,7 @@ def _planned(snapshot: Snapshot, view: View) -> list[str]:
         ]
     arguments = [
         f"model={_constructor(settings.model)}",
-        f"tension={_constructor(settings.tension)}",
+        *([] if underconstrained else [f"tension={_constructor(settings.tension)}"]),
         *([] if view.wrench is None else [f"wrench={_plain(view.wrench)}"]),
         *([] if snapshot.previous is None else [f"previous={_plain(snapshot.previous)}"]),
     ]

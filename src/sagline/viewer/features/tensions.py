@@ -22,7 +22,7 @@ from sagline.viewer.server import chosen_by, finite_numbers
 from sagline.viewer.snapshot import BY_HAND, METHODS, ByHand, MethodMark, MethodMarks, Snapshot, method_name
 from sagline.viewer.tension_scale import force_unit, number_text
 
-WIDTH, BORDER = 340, 26  # height of the drawing of an interval [px]
+WIDTH, BORDER = 340, 26  # width of the drawing, and its margin [px]
 HEIGHTS: Final = (0, 74, 190)  # height of the drawing by the number of redundant cables [px]
 BEYOND: Final = 0.5  # extension of the drawing of an unbounded polygon, relative to the size of its finite part
 
@@ -35,7 +35,7 @@ class DotField:
     # corners of the drawing in coordinates of the null space [N], shape (h, r), r = 1 or 2; an unbounded polygon is
     # clipped
     corners: Array
-    # limit of each side, from corner k to corner k + 1 (at corner k for an interval)
+    # limit of each side: side k goes from corner k to corner k + 1; for an interval, side k is corner k
     sides: tuple[Side | None, ...]
     low: Array  # lowest coordinates of the drawing [N], shape (r,)
     high: Array  # highest coordinates of the drawing [N], shape (r,)
@@ -169,7 +169,7 @@ def _why_not_drawn(snapshot: Snapshot) -> str:
     redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
     if redundant > MOST_REDUNDANT:
         return f"{redundant} redundant cables: the feasible tensions cannot be drawn in a plane."
-    return "No redundant cable: the force balance determines the tensions." if redundant == 0 else ""
+    return "No redundant cable: the force balance determines the tensions." if redundant <= 0 else ""
 
 
 def dot_field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
@@ -220,9 +220,8 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5.5" class="dot"/>'
     if not movable:
         return dot
-    unit, tension, plan = force_unit(snapshot.robot), snapshot.tension, snapshot.plan
-    text = f"{unit.bare(tension.min())} to {unit.written(tension.max())}"
-    text += "" if plan is None else f", {method_name(plan.tension)}"
+    text = force_unit(snapshot.robot).span(snapshot.tension)
+    text += "" if snapshot.plan is None else f", {method_name(snapshot.plan.tension)}"
     share = (point[0] - field.low[0]) / max(float(field.high[0] - field.low[0]), 1e-9)
     return (
         '<g class="handle" tabindex="0" role="slider" aria-label="Tensions in the set of feasible ones" '

@@ -17,7 +17,7 @@ from sagline.viewer.server import finite_numbers
 from sagline.viewer.tension_scale import linear
 from sagline.viewer.timeline import COLORS, Track, timeline_message
 
-_WIDTH: Final = 8.0  # height of the timeline [px]
+_WIDTH: Final = 8.0  # width of the line along the cable under the pointer [px]
 _COLORS: Final = linear(np.array([[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in COLORS], dtype=np.uint8))
 
 
@@ -31,6 +31,8 @@ LARGEST: Final = 1e300  # largest number in a message
 
 class TimelineFeature(Feature):
     """The timeline of browser/timeline.js: charts of the played motion, and the control of its clock."""
+
+    live = True
 
     def __init__(self, page: Page) -> None:
         """Register the messages of browser/timeline.js."""

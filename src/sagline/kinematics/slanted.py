@@ -1,0 +1,181 @@
+"""Inverse kinematics of robots whose pulleys swivel about axes of any direction; docs/model.md, section 10.
+
+The kernels of the inverse kinematics know vertical swivel axes only. The cables are therefore solved as cables that
+start at eyelets at their exit points. The tensions found determine new exit points, at which the next pass starts. A
+pass leaves about (R/D)(wL/T)^2 of the error. Poses without tensions within their limits are first solved with wider
+limits, because exit points of straight cables can make a pose near its limits infeasible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.kernels import codes, exits_of_forces, tables
+from sagline.kernels.cable import geometry as g
+from sagline.kinematics.inverse_rows import SOLVED, InverseRows
+from sagline.robot.batch import Robots, cables_of, first_of, robots_at
+from sagline.robot.pose import Pose
+from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing_chords, robot_terms
+
+if TYPE_CHECKING:
+    from sagline.kernels.inverse.poses import Robots as RobotTerms
+
+    # robot arrays, poses, and True for a repeated pass, without reports of its progress
+    Solve = Callable[[RobotTerms, Indices, bool], tuple[InverseRows, Array]]
+
+PASSES: Final = 30  # of the inverse kinematics; three or four are usual
+EXITS: Final = 60  # passes for the exit points at fixed chord tensions
+SAME: Final = 1e-14  # change of an exit point at convergence, relative to the free span
+CLOSE: Final = 1e-12  # largest accepted change after the last pass
+WIDEST, NARROWEST = 0.9, 1e-9  # widening of limits, share of the limits
+# statuses of poses that may be feasible at other exit points
+SHORT: Final = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED, codes.POSE_NOT_COVERED, codes.POSE_BORDERLINE)
+_TINY: Final = 1e-300
+
+
+class _Pass(NamedTuple):
+    """Results of one pass for k poses."""
+
+    found: InverseRows
+    rows: Array  # of the found poses, (k, POSE_COLUMNS)
+    chord: Array  # from the exit points of the pass to the platform ends, (k, m, 3) [m]
+    numbers: Array  # columns of `exits_of_forces` at the tensions found, (k, m, 6); NaN without tensions
+    change: Array  # of the exit points, relative to the chord, (k, m); 0 without tensions
+
+    @property
+    def solved(self) -> Flags:
+        """True for poses with tensions, (k,)."""
+        return np.isin(self.found.pose_status, SOLVED)
+
+
+def solve_slanted_axes(
+    robot: Robots, model: CableModel, pose: Pose, solve: Solve, stability: bool
+) -> tuple[InverseRows, Array]:
+    """Results of the inverse kinematics, and rows of the found poses. `solve`: solver for cables without pulleys."""
+    check_slanted(robot, model)
+    geometry = chord_geometry(robot, pose, slanted=True)
+    refuse_missing_chords(robot, pose, geometry)
+    freedom, bodies, table = robot_terms(robot, slanted=True)
+
+    def run(exits: Array, which: Indices, wider: ArrayLike, repeated: bool = True) -> _Pass:
+        """One pass for the poses `which`, at limits that are wider by the share `wider` of their values."""
+        own, body = (each[which] if len(each) > 1 else each for each in (table, bodies))
+        eyelets = np.empty((*exits.shape[:2], tables.CABLE_COLUMNS))
+        eyelets[:] = own[..., : tables.CABLE_COLUMNS]
+        eyelets[..., : tables.PLATFORM_X] = exits
+        eyelets[..., tables.PULLEY_RADIUS :] = 0.0
+        eyelets[..., tables.ENTRY] = 1.0
+        eyelets[..., tables.TENSION_MIN] *= 1.0 - np.reshape(wider, (-1, 1))
+        eyelets[..., tables.TENSION_MAX] *= 1.0 + np.reshape(wider, (-1, 1))
+        found, rows = solve((freedom, locked(body), locked(eyelets)), which, repeated)
+        reached = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
+        ends = _ends(own, reached.position, reached.matrix)
+        tension = found.results[tables.TENSION]
+        numbers = _exits(robots_at(robot, which), model, own, body, ends, exits, tension)
+        moved = np.where(np.isfinite(tension), np.abs(numbers[..., :3] - exits).max(axis=-1), 0.0)
+        return _Pass(found, rows, ends - exits, numbers, moved / np.linalg.norm(ends - exits, axis=-1))
+
+    chord = _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
+    exits = _ends(table, pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3)) - chord
+    everywhere = np.arange(len(exits))
+    near, unsure = np.zeros((2, len(exits)), dtype=np.bool_)  # poses whose limits were widened; without a sure verdict
+    for count in range(PASSES):
+        last = run(exits, everywhere, 0.0, repeated=count > 0)
+        short = np.isin(last.found.pose_status, SHORT)
+        fresh = short & ~near
+        if not fresh.any() and not (last.change > SAME).any():
+            break
+        known = np.isfinite(last.numbers[..., :1])
+        exits = np.where(known, last.numbers[..., :3], exits)
+        unsure |= last.solved & near  # its verdict has changed if it is infeasible at the end
+        if fresh.any():
+            unsure[_approach_limits(run, exits, np.flatnonzero(fresh))] = True
+            near |= fresh
+    found, solved = last.found, last.solved
+    lost = (solved & (last.change > CLOSE).any(axis=-1)) | (short & (unsure | fresh))
+    found.pose_status[lost] = codes.POSE_NOT_CONVERGED
+    found.brackets[lost] = np.nan
+    _write(found.results, np.where(solved[:, None, None], last.chord, np.nan), last.numbers)
+    if stability:
+        found.pose_status[solved & ~lost & ~found.at_border] = codes.UNPROVED_STABILITY
+    return found, last.rows
+
+
+def _approach_limits(run: Callable[[Array, Indices, Array], _Pass], exits: Array, which: Indices) -> Indices:
+    """Move the exit points of the infeasible poses `which` to those at tensions close to the limits.
+
+    The limits are widened less and less. A pose stays infeasible if the last change of its exit points is smaller than
+    the widening of the limits that does not make it feasible. Returns the poses at which this remains unknown.
+    """
+    wider, moved, unsure = np.full(len(which), WIDEST), np.zeros(len(which)), []
+    for _ in range(PASSES):
+        last = run(exits[which], which, wider)
+        solved = last.solved
+        exits[which[solved]] = last.numbers[solved, :, :3]
+        moved[solved] = last.change[solved].max(axis=-1)
+        infeasible = last.found.pose_status == codes.POSE_INFEASIBLE
+        sure = np.where(solved, wider < NARROWEST, infeasible & (moved < wider))
+        unsure.append(which[~sure & ~solved & (wider < NARROWEST)])
+        left = ~sure & (solved | (wider >= NARROWEST))
+        wider = np.where(infeasible, np.minimum(2.0 * wider, WIDEST), 0.25 * wider)
+        which, wider, moved = which[left], wider[left], moved[left]
+        if not which.size:
+            break
+    return np.concatenate((*unsure, which))
+
+
+def _ends(table: Array, position: Array, matrix: Array) -> Array:
+    """Platform ends in world axes (N, m, 3) [m]."""
+    anchors = table[..., tables.PLATFORM_X : tables.PLATFORM_X + 3]
+    return np.asarray(position[:, None] + anchors @ np.swapaxes(matrix, -1, -2))
+
+
+def _world(cosine: Array, sine: Array, level: Array, up: Array) -> Array:
+    """Vectors (..., 3) in world axes from their components in vertical planes with the azimuth of `cosine`, `sine`."""
+    return np.stack((level * cosine, level * sine, up), axis=-1)
+
+
+def _exits(
+    robot: Robots, model: CableModel, table: Array, bodies: Array, ends: Array, exits: Array, tension: Array
+) -> Array:
+    """Exit points of cables at chord tensions (N, m), found by repeated substitution; columns of `exits_of_forces`."""
+    gravity = first_of(robot).gravity
+    cable, weightless = cables_of(robot), model.code == codes.ELASTIC
+    weight = 0.0 if weightless else cable.linear_density * gravity
+    acting = bodies[:, tables.GRAVITY] * (0.0 if weightless else 1.0)
+    numbers, kept = np.empty((*tension.shape, 6)), None
+    for _ in range(EXITS):
+        chord = ends - exits
+        span = np.hypot(chord[..., 0], chord[..., 1])
+        held = np.where(np.isfinite(tension), tension, 1.0)
+        state = model.from_tension(cable, span, chord[..., 2], held, gravity)
+        level = chord[..., :2] / np.maximum(span, _TINY)[..., None]
+        vertical = state.vertical_force - weight * state.unstrained_length
+        force = _world(level[..., 0], level[..., 1], state.horizontal_tension, vertical)
+        exits_of_forces(table, locked(acting), locked(force), numbers)
+        new = numbers[..., :3].copy()
+        missed = new - exits
+        if not (np.abs(missed).max(axis=-1) > SAME * np.linalg.norm(chord, axis=-1)).any():
+            break
+        share: Array | float = 0.0
+        if kept is not None:  # Anderson mixing with the last pass, for each cable
+            change = missed - kept[1]
+            share = ((missed * change).sum(axis=-1) / np.maximum((change * change).sum(axis=-1), _TINY))[..., None]
+        exits = new if kept is None else new - share * (new - kept[0])
+        kept = new, missed
+    numbers[~np.isfinite(tension)] = np.nan
+    return numbers
+
+
+def _write(results: Array, chord: Array, numbers: Array) -> None:
+    """Write exit points and lengths off the drum to the results of cables without pulleys."""
+    results[tables.WRAP], results[tables.WRAPPED], results[tables.DEAD] = np.moveaxis(numbers[..., 3:], -1, 0)
+    results[tables.LENGTH] += results[tables.WRAPPED] + results[tables.DEAD]
+    results[tables.SINE] = chord[..., 2] / np.linalg.norm(chord, axis=-1)
+    results[tables.AZIMUTH] = np.arctan2(chord[..., 1], chord[..., 0])
