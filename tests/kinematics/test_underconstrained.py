@@ -102,6 +102,21 @@ def test_cables_that_would_push_or_exceed_a_limit_are_named() -> None:
         assert np.flatnonzero(plan.blocking).tolist() == [cable]
 
 
+@pytest.mark.parametrize("radius", [None, 0.03])
+def test_a_limit_just_below_the_smallest_tension_does_not_end_the_search(radius: float | None) -> None:
+    """With heavy cables, the Newton steps to some of these equilibria come from below the limit."""
+    wanted = places(4, 400) * (1.6, 1.6, 1.0)
+    plan = sl.inverse(suspended(4, 0.5, radius), wanted)
+    assert plan.solved.sum() > 300
+    for position, tension in zip(wanted[plan.solved], plan.chord_tension[plan.solved], strict=True):
+        least = tension.min()
+        below = sl.inverse(suspended(4, 0.5, radius, tension_min=least * (1.0 - 1e-5)), position)
+        assert below.status == sl.PoseStatus.SOLVED, position
+        above = sl.inverse(suspended(4, 0.5, radius, tension_min=least * (1.0 + 1e-5)), position)
+        assert above.status == sl.PoseStatus.INFEASIBLE, position
+        assert np.flatnonzero(above.blocking).tolist() == [tension.argmin()], position
+
+
 def test_a_high_center_of_mass_makes_the_equilibrium_unstable() -> None:
     robot = suspended(3, center_of_mass=(0.0, 0.0, 0.9))
     plan = sl.inverse(robot, (0.0, 0.0, 1.0))

@@ -29,7 +29,8 @@ TURN = 0.3  # largest turn per step [rad]
 SHRINK = 0.2  # smallest ratio of a tension to its value before the step
 FLOOR = 0.02  # smallest initial tension, relative to the mean load of a cable
 RIDGE = 1e-6  # relative regularization of the initial tensions
-PATIENCE = 5  # after this number of consecutive steps at a smallest tension, the search ends without an equilibrium
+PATIENCE = 5  # consecutive steps at a smallest tension, after which the search admits smaller tensions, or ends
+BELOW = 0.5  # smallest tension of the continued search, relative to the smallest admissible tension
 ITERATIONS = 12  # inverse iterations for the tension level; each reduces the error by the ratio of two eigenvalues
 WITHIN = 1e-9  # relative violation of a limit that counts as rounding error
 
@@ -217,10 +218,11 @@ def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
 
 
 @glue
-def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, bool]:
+def _take_step(search: _Search, space: UnderconstrainedArrays, floor: float) -> tuple[float, bool]:
     """Move pose and tensions by the shortened step. Returns the step size, and True if a tension is too small.
 
-    `search.blocking` is filled: True for the cables that the step would take below their smallest admissible tension.
+    `floor`: smallest tension of a cable, relative to its smallest admissible tension. `search.blocking` is filled: True
+    for the cables that the step would take below this tension.
     """
     platform, cables, pose, tau = search.platform, search.curves.cables, search.pose, space.tau
     freedom, step, n = platform.freedom, space.step, platform.freedom.shape[0]
@@ -236,9 +238,10 @@ def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, b
     for i in range(tau.size):
         size = max(size, abs(step[n + i]) / tau[i])
         wanted = max(tau[i] + step[n + i], SHRINK * tau[i])
-        search.blocking[i] = wanted < cables.low[i] * (1.0 - WITHIN)
+        least = floor * cables.low[i]
+        search.blocking[i] = wanted < least * (1.0 - WITHIN)
         short = short or search.blocking[i]
-        tau[i] = max(wanted, cables.low[i])
+        tau[i] = max(wanted, least)
     return size, short
 
 
@@ -246,11 +249,12 @@ def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, b
 def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
     """Take Newton steps until the balance holds. Returns POSE_SOLVED or the failure.
 
-    The pose of `search` and the tensions of `space` contain the initial values, and at the end the last values.
+    The pose of `search` and the tensions of `space` contain the initial values, and at the end the last values. Steps
+    that stop at a smallest admissible tension can miss an equilibrium slightly above it; the search continues below.
     """
     model, cables, tau = search.curves.model, search.curves.cables, space.tau
     status = codes.POSE_NO_EQUILIBRIUM
-    waited = 0
+    waited, floor = 0, 1.0
     for step in range(STEPS):
         if not statics.place_platform(model, search.limits, search.platform, search.pose, cables, search.balance):
             break
@@ -261,19 +265,22 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
         _fill_system(search, space)
         if not solve_general(space.jacobian, space.step):
             return codes.POSE_SINGULAR
-        size, short = _take_step(search, space)
+        size, short = _take_step(search, space, floor)
         waited = waited + 1 if short else 0
         if waited == PATIENCE:
-            return codes.POSE_INFEASIBLE
+            if floor == BELOW:
+                return codes.POSE_INFEASIBLE
+            waited, floor = 0, BELOW
         if size != size:
             break
         if size <= CONVERGED and step < STEPS - 1:
             status = codes.POSE_SOLVED
+    infeasible = False
     for i in range(tau.size):
-        search.blocking[i] = status == codes.POSE_SOLVED and tau[i] > cables.high[i] * (1.0 + WITHIN)
-        if search.blocking[i]:
-            status = codes.POSE_INFEASIBLE
-    return status
+        outside = tau[i] > cables.high[i] * (1.0 + WITHIN) or tau[i] < cables.low[i] * (1.0 - WITHIN)
+        search.blocking[i] = outside and status == codes.POSE_SOLVED
+        infeasible = infeasible or search.blocking[i]
+    return codes.POSE_INFEASIBLE if infeasible else status
 
 
 @entry
