@@ -94,7 +94,7 @@ RESULTS = frozenset(
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
     | {"Components", "Front", "Margin", "MovingAnchors", "Proof", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
-    | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
+    | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Uncertainty", "Vibration", "WinchRates"}
     | {"Calibration", "CalibrationPoses", "PoseError"}
 )
 # require a machine at the other end, or are one: tests/plc/test_bad_arguments.py
@@ -104,7 +104,7 @@ CRITERIA = ("Clearance", "Criterion", "InFrame", "LeastFrequency", "LeastMargin"
 TABULAR = (
     *("Confirmation", "Equilibria", "Equilibrium", "ForwardSolution", "FrequencyMap", "FrequencyResponse", "Margin"),
     *("Modes", "MovingAnchors", "Path", "Simulation", "TensionPolygon", "Vibration", "WinchRates", "control.Execution"),
-    *("Clearances", "WinchLog"),
+    *("Clearances", "Uncertainty", "WinchLog"),
 )
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}

@@ -77,6 +77,18 @@ def test_track_prints_and_writes_results_of_the_library(folder: FilePath) -> Non
     np.testing.assert_array_equal(loaded.unstrained_length, plan.unstrained_length)
 
 
+def test_track_writes_the_errors_that_tolerances_cause() -> None:
+    robot = sl.load_robot("article-suspended").replace(tolerances={"frame_anchors": 1e-3})
+    FilePath("known.yaml").write_text(sl.dump_robot(robot))
+    (run,) = numbers("track", "known.yaml", "inside.yaml", "--uncertainty", "--csv", "--no-figures")["runs"]
+    found = sl.inverse(robot, sl.load_path("inside.yaml")).uncertainty()
+    assert run["expected_error_max_mm"] == pytest.approx(1e3 * found.position.max(), rel=1e-12)
+    assert run["expected_tension_max_n"] == pytest.approx(found.tension.max(), rel=1e-12)
+    name = "article-suspended-catenary-uncertainty.csv"
+    assert FilePath("output", name).read_text() == found.to_csv()
+    assert sagline("track", "article-suspended", "inside.yaml", "--uncertainty", "--no-figures").exit_code == 2
+
+
 def test_options_reach_the_solver() -> None:
     words = ("track", "article-mixed", "inside.yaml", "--no-figures")
     (run,) = numbers(*words, "--tension", "minimum-norm", "--variable", "horizontal", "--model", "parabolic")["runs"]

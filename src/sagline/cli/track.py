@@ -33,13 +33,15 @@ def track(
     variable: opt.TensionVariable = opt.VARIABLE,
     wrench: Any = opt.WRENCH,
     payload: float | None = opt.PAYLOAD,
+    uncertainty: bool = opt.flag(False, "Errors of poses and tensions due to the robot's tolerances.", "--uncertainty"),
     files: opt.Files = opt.Files(),
 ) -> int:
     """Plan the cable lengths of a robot along a path, and confirm them with exact catenaries.
 
     The lengths are computed with the chosen cable model. The confirmation finds the equilibrium of the platform on
     exact catenaries of these lengths. The position error is the distance of this equilibrium from the planned pose.
-    The plan is written to DIR/ROBOT-MODEL.nc. --csv also writes poses, lengths and tensions as a table.
+    The plan is written to DIR/ROBOT-MODEL.nc. --csv also writes poses, lengths and tensions as a table, and with
+    --uncertainty a table of the expected errors.
 
     For example:
 
@@ -50,14 +52,20 @@ def track(
     machine = opt.robot_with_payload(robot, payload)
     way = sl.article_path() if path is None else load_path_near(machine, path)
     cable = opt.model_named(model)
-    output = Output(files, run_name(machine, cable), [".nc"], [f"-{figure}" for figure in FIGURES], ".csv")
+    if uncertainty:  # refuse missing tolerances before any other work
+        sl.inverse(machine, way.pose[:1], cable).uncertainty()
+    tables = (".csv", "-uncertainty.csv")[: 1 + uncertainty]
+    output = Output(files, run_name(machine, cable), [".nc"], [f"-{figure}" for figure in FIGURES], *tables)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses") as line:
         run = ConfirmedRun.along(machine, way, cable, opt.tension_named(tension, variable), line, wrench)
+        run = run._replace(uncertainty=run.plan.uncertainty() if uncertainty else None)
     with working("writing"):
         run.plan.save(output.file(".nc"))
         output.table(".csv", run.plan.table)
+        if run.uncertainty is not None:
+            output.table("-uncertainty.csv", run.uncertainty.table)
         output.draw(*_figures(run))
-    return tell([run], output)
+    return tell([run], output, [] if run.uncertainty is None else [f"{run.uncertainty}."])
 
 
 def load_path_near(robot: sl.Robot, file: Path) -> sl.Path:
@@ -108,10 +116,11 @@ SAME_PLACE = (
 
 
 class ConfirmedRun(NamedTuple):
-    """A plan along a path, its confirmation, and the computing time of the inverse kinematics [s]."""
+    """A plan along a path, its confirmation, computing time of the inverse kinematics [s], and expected errors."""
 
     confirmation: sl.Confirmation
     seconds: float
+    uncertainty: sl.Uncertainty | None = None
 
     @property
     def plan(self) -> sl.Plan:
@@ -248,6 +257,7 @@ def _record(run: ConfirmedRun) -> dict[str, Any]:
         "poses": plan.status.size,
         **run.summary(),
         "poses_not_stable": run.lost,
+        **({} if run.uncertainty is None else _errors(run.uncertainty)),
         "gaps": [
             {
                 "from_s": None if clock is None else clock[gap.first],
@@ -258,6 +268,14 @@ def _record(run: ConfirmedRun) -> dict[str, Any]:
             for gap in plan.gaps
         ],
     }
+
+
+def _errors(found: sl.Uncertainty) -> dict[str, Any]:
+    """Largest expected errors of the solved poses for JSON."""
+    largest = (_range(each)[1] for each in (1e3 * found.position, found.rotation, found.tension))
+    return dict(
+        zip(("expected_error_max_mm", "expected_rotation_max_rad", "expected_tension_max_n"), largest, strict=True)
+    )
 
 
 def _range(values: Array) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from sagline.kinematics.inverse import inverse
 from sagline.robot.drum import drum_lever
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot, with_quantities
+from sagline.robot.robot import Robot, standard_errors, with_quantities
 from sagline.robot.tolerances import UNCERTAIN, value_of
 from sagline.robot.winch import Winch
 from sagline.statics.stiffness import stiffness
@@ -41,7 +41,7 @@ def _length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Ar
     assert winches is not None  # a controller needs the data of the drums
     length, lever = state.unstrained_length, drum_lever(robot, state.unstrained_length)  # lever: [m/rad]
     variance = sum((part**2 for part in _at_pose(robot, state, model)), np.zeros(robot.cable_count))
-    errors = _standard_errors(robot)
+    errors = standard_errors(robot)
     if winches.length_zero is not None:
         variance += np.square(errors.get("length_zero", 0.0))
         variance += np.square(errors.get("drum_radius", 0.0) * (length - winches.length_zero) / lever)
@@ -67,7 +67,7 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
         return np.asarray((there - here) / (stretch * _SHARE))
 
     yield change(robot, _SHARE * _cell_sigma(robot))
-    for name, error in _standard_errors(robot).items():
+    for name, error in standard_errors(robot).items():
         if name in _READING or not UNCERTAIN[name].each:  # a load has no effect, because tensions are given
             continue
         if not np.isfinite(error).all():
@@ -87,14 +87,6 @@ def _zeros(winches: Winch | None) -> Array:
     assert winches is not None
     assert winches.length_zero is not None
     return winches.length_zero
-
-
-def _standard_errors(robot: Robot) -> dict[str, Array]:
-    """Standard errors by name: tolerances of the robot, or errors of its calibration if these are smaller."""
-    errors = dict(robot.tolerances)
-    for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
-        errors[name] = np.minimum(error, errors.get(name, np.where(np.isfinite(error), error, 0.0)))
-    return errors
 
 
 def _varied(robot: Robot, name: str, change: Array) -> Robot:

@@ -18,6 +18,7 @@ from .plan import Plan as Plan
 from .polygon import tension_polygon as tension_polygon
 from .status import ForwardStatus as ForwardStatus
 from .status import PoseStatus as PoseStatus
+from .uncertainty import Uncertainty as Uncertainty
 from .winches import WinchRates as WinchRates
 from .winches import encoder_counts as encoder_counts
 from .winches import lengths_from_counts as lengths_from_counts

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from importlib import import_module
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from sagline.core.table import Columns, Tabular
 from sagline.kernels import tables
 from sagline.kinematics.inverse_rows import solve_inverse_rows
 from sagline.kinematics.status import BALANCED, PoseStatus
+from sagline.kinematics.uncertainty import Uncertainty
 from sagline.motion.path import Path, spline_rates
 from sagline.robot.batch import Robots, first_of, has_slanted_axes
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
@@ -33,6 +35,8 @@ SHARE = 1e-5  # step relative to the time scale of the motion; central differenc
 # to 1e-8
 ONE_SIDED = 4.0
 LONGEST = 1e-2  # largest step relative to the time between samples
+# loaded by name on demand, because calibration imports this module
+_UNCERTAINTY: Final = "sagline.calibration.uncertainty"
 _CONSTANT = 1e-9  # differences of a wrench below this share of its largest component count as zero
 
 
@@ -183,6 +187,35 @@ class Plan(Result, Saved, Tabular):
         from sagline.statics.stiffness import smallest_stiffness  # not needed for a plan alone
 
         return smallest_stiffness(self.state)
+
+    def uncertainty(self) -> Uncertainty:
+        """Compute the errors of poses and tensions that the tolerances of the robot cause, by first order.
+
+        The winches have the lengths of the plan. The true robot deviates from the robot of the plan by independent
+        errors, with the standard deviations in `Robot.tolerances`, or the standard errors of its calibration if these
+        are smaller. The wrench of the plan stays the same. Tolerances of load cells have no effect.
+
+        Returns:
+            Uncertainty; NaN where the plan is not solved.
+
+        Raises:
+            InvalidValueError: If the robot has no tolerances, an infinite tolerance, or a tolerance of a quantity that
+                it does not have. If the cable model is neither `Catenary` nor `Elastic`. If a swivel axis is slanted.
+
+        Examples:
+            >>> import sagline as sl
+            >>> robot = sl.load_robot("cogiro")
+            >>> robot = robot.replace(tolerances={"frame_anchors": 0.002, "mass": 0.5})
+            >>> found = sl.inverse(robot, (1, 0.5, 1.5)).uncertainty()
+            >>> print(f"{1e3 * found.position:.2f} mm, mostly {found.position_source}")
+            2.92 mm, mostly frame_anchors
+
+        Source:
+            Implicit function theorem at each equilibrium, with the derivatives of `calibrate`: docs/model.md, section
+            14.
+        """
+        found: Uncertainty = import_module(_UNCERTAINTY).uncertainty_of(self)
+        return found
 
     @property
     def gaps(self) -> tuple[Gap, ...]:

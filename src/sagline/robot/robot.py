@@ -287,6 +287,14 @@ def with_quantities(robot: Robot, values: Mapping[str, Array]) -> Robot:
     return robot.replace(**parts, **changes)
 
 
+def standard_errors(robot: Robot) -> dict[str, Array]:
+    """Standard errors by name: tolerances of the robot, or errors of its calibration if these are smaller."""
+    errors = dict(robot.tolerances)
+    for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
+        errors[name] = np.minimum(error, errors.get(name, np.where(np.isfinite(error), error, 0.0)))
+    return errors
+
+
 def _alike(one: Array | None, other: Array | None) -> bool:
     return one is other if one is None or other is None else np.array_equal(one, other)
 
