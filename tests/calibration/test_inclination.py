@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
@@ -20,7 +21,9 @@ from tests.calibration import reference
 from tests.calibration.four_cables import drawn_robot, log_with_inclinations, twin_of
 from tests.calibration.machines import robots, standing
 from tests.refusal import refused
+from tests.tiers import wide
 
+FOUND = sl.CalibrationStatus.FOUND
 TILT = 1e-3  # rad
 UP = np.array([0.0, 0.0, 1.0])
 COLUMNS = [
@@ -119,3 +122,37 @@ def test_a_roll_with_the_wrong_sign_is_named() -> None:
         sl.calibrate(drawn_robot(), log.replace(rotation=Rotation.from_euler("ZYX", angles).as_quat()), folds=0)
     assert "inclinations" in caught.value.value
     assert "gamma" in caught.value.next_step
+
+
+MISTAKES = {  # yaw, pitch and roll: which column is read for each, and its sign
+    "change the sign of gamma": ([0, 1, 2], [1.0, 1.0, -1.0]),
+    "change the sign of beta": ([0, 1, 2], [1.0, -1.0, 1.0]),
+    "change the signs of beta and gamma": ([0, 1, 2], [1.0, -1.0, -1.0]),
+    "exchange beta and gamma": ([0, 2, 1], [1.0, 1.0, 1.0]),
+    "exchange beta and gamma, and change the sign of gamma": ([0, 2, 1], [1.0, -1.0, 1.0]),
+    "exchange beta and gamma, and change the sign of beta": ([0, 2, 1], [1.0, 1.0, -1.0]),
+    "exchange beta and gamma, and change both signs": ([0, 2, 1], [1.0, -1.0, -1.0]),
+}
+
+
+def alone(seed: int, columns: list[int], signs: list[float]) -> sl.WinchLog:
+    """Log of lengths and inclinations without load cells, with changed columns of yaw, pitch and roll."""
+    log = inclined(seed)[0]
+    assert log.rotation is not None
+    angles = Rotation.from_quat(log.rotation.copy()).as_euler("ZYX")[:, columns] * signs
+    sensors = log.sensors.replace(tension_deviation=None)
+    return log.replace(load_cells=None, rotation=Rotation.from_euler("ZYX", angles).as_quat(), sensors=sensors)
+
+
+@pytest.mark.parametrize("seed", wide(range(4, 25)))
+def test_inclinations_without_load_cells_are_accepted(seed: int) -> None:
+    assert sl.calibrate(drawn_robot(), alone(seed, [0, 1, 2], [1.0, 1.0, 1.0]), folds=0).status is FOUND
+
+
+@pytest.mark.parametrize(("seed", "correction"), wide([(k, name) for k in range(4, 25) for name in MISTAKES], 2))
+def test_wrong_inclinations_without_load_cells_are_named_with_their_correction(seed: int, correction: str) -> None:
+    with refused("log", kind=sl.InvalidValueError) as caught:
+        sl.calibrate(drawn_robot(), alone(seed, *MISTAKES[correction]), folds=0)
+    assert "inclinations" in caught.value.value
+    step = caught.value.next_step
+    assert step[:1].lower() + step[1:].partition(" (misfit")[0] == correction

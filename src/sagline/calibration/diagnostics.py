@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.calibration.hypotheses import CELL_UNITS, LENGTH_UNITS, Hypothesis, Trial
+from sagline.calibration.hypotheses import CELL_UNITS, LENGTH_UNITS, TILTS, Hypothesis, Trial
 from sagline.calibration.log import WinchLog, load_cells_of, measures_yaw
 from sagline.calibration.screening import screen
 from sagline.core.arguments import instance
@@ -40,9 +40,10 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
     A comparison of the readings with their expected sizes detects lengths and positions in mm, and load cells in kN.
     Then a robot similar to the given robot is fitted to about 24 rows. If no similar robot fits, the function tests
     corrections of single mistakes. These mistakes are exchanged columns of two cables (encoders, load cells or both),
-    an encoder that counts backward, zeros with large errors, load cells or lengths up to five rows early or late, and
-    wrong units (kgf, lbf, ft, in). The first correction with a good fit is reported as the mistake. Zeros with large
-    errors, lengths with the wrong sign, and lengths that are early or late, are found only with commanded poses.
+    an encoder that counts backward, zeros with large errors, load cells or lengths up to five rows early or late, wrong
+    units (kgf, lbf, ft, in), and roll and pitch of an inclinometer with wrong signs or exchanged. The first correction
+    with a good fit is reported as the mistake. Zeros with large errors, lengths with the wrong sign, and lengths that
+    are early or late, are found only with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -50,9 +51,10 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
     if found := tuple(wrong_units(robot, log)):
         return found  # other mistakes can be found only after the units are right
     _, rows, _ = screen(robot, log)
+    trial = Trial(robot, model, log, rows)
     if not len(rows) or (log.load_cells is None and log.position is None):
-        return ()
-    return tuple(_single_mistake(Trial(robot, model, log, rows)))
+        return tuple(_wrong_tilt(trial)) if len(rows) else ()
+    return tuple(_single_mistake(trial))
 
 
 def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
@@ -101,6 +103,9 @@ def measured_pose_mistakes(
     robot: Robot, log: WinchLog, left_out: Indices, asked: Collection[str], model: CableModel
 ) -> Iterator[str]:
     """Sentence about measured poses (rows `left_out`) that disagree with the lengths while all other readings fit."""
+    if found := list(_wrong_tilt(Trial(robot, model, log, np.arange(len(log))))):
+        yield from found
+        return
     points = np.zeros((0, 3)), np.zeros((0, 3))
     if log.position is not None:
         placed = np.flatnonzero(~np.isnan(log.position).any(axis=1))
@@ -129,6 +134,9 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
         elif departure > NEAR:
             yield from _other_unit(trial, departure)
         return
+    if found := list(_wrong_tilt(trial)):
+        yield from found
+        return
     enough = max(GOOD, min(POOR, 0.01 * before))
     for changes, steps in ((_length_changes(trial), 0), (_load_cell_changes(trial), 1)):
         for change in trial.most_promising(changes, steps, _FULLY):
@@ -141,6 +149,18 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
                 text = _change_text(change, trial.log)
                 yield f"{text} (misfit {_misfit_text(before)}, then {_misfit_text(after)})"
             return
+
+
+def _wrong_tilt(trial: Trial) -> Iterator[str]:
+    """Sentence about roll and pitch of an inclinometer, if one correction predicts a clearly smaller misfit."""
+    if trial.log.rotation is None or measures_yaw(trial.log.sensors):
+        return
+    promises = {tilt: trial.promise(Hypothesis(tilt=tilt), 0) for tilt in TILTS}
+    best, second = sorted(promises, key=promises.__getitem__)[:2]
+    if best and promises[best] < CLEARLY * promises[second]:
+        before, after = (_misfit_text(0.5 * promises[tilt]) for tilt in ("", best))
+        what = "the measured inclinations disagree with the lengths"
+        yield f"{what}: {best} (misfit after one step {before}, then {after})"
 
 
 def _other_unit(trial: Trial, departure: float) -> Iterator[str]:

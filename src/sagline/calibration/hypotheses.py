@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
 from sagline.calibration.least_squares import best_step, evaluate_step, solve
@@ -39,6 +40,17 @@ _WIDE: Final = {
 
 CELL_UNITS: Final = {"": 1.0, "kgf": 9.80665, "lbf": 4.4482216152605}  # [N]
 LENGTH_UNITS: Final = {"": 1.0, "ft": 0.3048, "in": 0.0254}  # [m]
+# Corrections of an inclinometer: the column that is read as pitch and as roll, 0: beta, 1: gamma, and its sign.
+TILTS: Final = {
+    "": ((0, 1.0), (1, 1.0)),
+    "change the sign of gamma": ((0, 1.0), (1, -1.0)),
+    "change the sign of beta": ((0, -1.0), (1, 1.0)),
+    "change the signs of beta and gamma": ((0, -1.0), (1, -1.0)),
+    "exchange beta and gamma": ((1, 1.0), (0, 1.0)),
+    "exchange beta and gamma, and change the sign of gamma": ((1, 1.0), (0, -1.0)),
+    "exchange beta and gamma, and change the sign of beta": ((1, -1.0), (0, 1.0)),
+    "exchange beta and gamma, and change both signs": ((1, -1.0), (0, -1.0)),
+}
 
 
 class Hypothesis(NamedTuple):
@@ -52,6 +64,7 @@ class Hypothesis(NamedTuple):
     behind: int = 0  # number of rows by which the encoders lag behind the load cells and the commanded poses
     cell_unit: str = ""  # unit of the load cells in `CELL_UNITS`; "" for newtons
     length_unit: str = ""  # unit of the lengths in `LENGTH_UNITS`; "" for meters
+    tilt: str = ""  # correction of an inclinometer in `TILTS`; "" for none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,6 +155,8 @@ class Trial:
             zero = winches.count_zero[cable] if counted and winches is not None else read[:, cable].max()
             read[:, cable] = 2.0 * zero - read[:, cable]
         given = given._replace(**{"counts" if counted else "lengths": read})
+        if change.tilt:
+            given = given._replace(rotations=_changed_tilt(given.rotations, TILTS[change.tilt]))
         wide = [Unknown(name, deviation=width) for name, width in _WIDE.items() if self._has(name, counted)]
         parameters = parameters_of(self.robot, wide, log.sensors, counted=counted)
         problem = FitProblem(self.robot, self.model, log.sensors, parameters, given)
@@ -157,7 +172,7 @@ class Trial:
 
     def _poses(self, problem: FitProblem, change: Hypothesis, most: int) -> Pose | None:
         """Poses by forward kinematics of the lengths; None if the forward kinematics of any row fails."""
-        key = change._replace(cells=None, cell_unit=""), most
+        key = change._replace(cells=None, cell_unit="", tilt=""), most
         if key not in self.found:
             rows = start_of(problem, None).poses
             if not np.isfinite(rows).all():
@@ -198,3 +213,12 @@ def _swap_columns(values: Array, two: tuple[int, int] | None) -> Array:
     if two is not None:
         values[:, list(two)] = values[:, list(two[::-1])]
     return values
+
+
+def _changed_tilt(rotations: Array, correction: tuple[tuple[int, float], tuple[int, float]]) -> Array:
+    """Quaternions (N, 4) whose pitch and roll are changed; rows of NaN stay."""
+    found, read = rotations.copy(), ~np.isnan(rotations).any(axis=1)
+    yaw, *tilt = Rotation.from_quat(rotations[read]).as_euler("ZYX").T
+    (pitch, one), (roll, other) = correction
+    found[read] = Rotation.from_euler("ZYX", np.stack((yaw, one * tilt[pitch], other * tilt[roll]), axis=1)).as_quat()
+    return found
