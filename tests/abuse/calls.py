@@ -636,6 +636,10 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 progress=("callback", lambda done, of: None, True),
             ),
         ),
+        "workspace: few cables": Call(
+            partial(sl.workspace, given.suspended, sl.PoseBox([-0.1, -0.1, 0.9], [0.1, 0.1, 1.1]), cells=4),
+            _all(given=("words", ["x", "y", "z", "yaw"], True)),
+        ),
         "Components.label": Call(space.components.label, _all(position=("array", [0.0, 0.0, 1.5]))),
         "Surface.export": Call(space.surface.export, _all(file=("file", given.folder / "hull.stl"))),
         "Workspace.save": Call(space.save, _all(file=("file", given.folder / "saved.nc"))),

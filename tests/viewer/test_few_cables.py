@@ -1,6 +1,7 @@
 """The viewer with fewer cables than degrees of freedom: the position is given, the balance determines the rotation."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,6 +36,21 @@ def test_a_state_has_the_rotation_of_the_balance_for_any_rotation_of_the_gizmo()
     np.testing.assert_array_equal(snapshot.pose.quaternion, plan.state.pose.quaternion)
     np.testing.assert_array_equal(snapshot.tension, plan.chord_tension)
     assert "balance" in snapshot.origin
+
+
+def test_a_given_yaw_is_that_of_the_gizmo() -> None:
+    settings = Settings(mass=FOUR.mass, given=("x", "y", "z", "yaw"))
+    snapshot = snapshot_at(FOUR, sl.Pose.from_euler(HERE, -0.01, -0.4, 0.3), settings, None)
+    assert snapshot.feasible
+    assert snapshot.pose.rotation.as_euler("ZYX")[0] == pytest.approx(-0.01, abs=1e-9)
+    view = View(snapshot, settings, TensionScale.of(FOUR), ghost=False)
+    names: dict[str, Any] = {"four": FOUR}
+    exec(code_of(view, FOUR.replace(name="four"), Source("four"), 0.0), names)
+    np.testing.assert_allclose(names["tension"], snapshot.tension, rtol=1e-9)
+    yaw = sl.Pose.from_euler(np.zeros(3), -0.01, 0.0, 0.0).quaternion
+    query = WorkspaceQuery(FOUR, yaw, sl.Catenary(), sl.Accelerations(), (), settings.given)
+    found = query.levels().details(np.array([HERE]))
+    assert found.margin[0] == pytest.approx(np.minimum(snapshot.tension - 5.0, 200.0 - snapshot.tension).min())
 
 
 def test_a_position_without_equilibrium_names_the_cables_and_no_force() -> None:

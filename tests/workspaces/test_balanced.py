@@ -5,11 +5,13 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
 from sagline.core.arrays import Array
+from sagline.kinematics.inverse_rows import Given
 from sagline.workspaces import balanced
 from sagline.workspaces.workspace import BY_BOX
 from tests.kinematics.test_underconstrained import suspended
@@ -80,6 +82,46 @@ def test_the_sign_of_the_margin_is_the_verdict_of_inverse_with_heavy_cables(
     tension = plan.state.limited_tension[plan.solved]
     distance = np.minimum(tension - lowest, 200.0 - tension).min(axis=1)
     np.testing.assert_allclose(margin[plan.solved], distance, rtol=1e-12, atol=1e-9)
+
+
+def test_with_a_given_yaw_the_platform_has_this_yaw(tmp_path: Path) -> None:
+    turned = sl.Orientations(Rotation.from_euler("z", [-0.02]))
+    names: tuple[Given, ...] = ("x", "y", "z", "yaw")
+    places = np.random.default_rng(6).uniform(BOX.low, BOX.high, (1500, 3))
+    robot = suspended(4, center_of_mass=(0.06, 0.03, -0.05), tension_min=5.0, tension_max=90.0)
+    starts = sl.Pose.from_euler(places, -0.02, 0.0, 0.0)
+    plan, level = sl.inverse(robot, starts, given=names), sl.inverse(robot, places)
+    whole = sl.workspace(robot, BOX, orientations=turned, given=names, cells=4, refine=False)
+    whole.save(tmp_path / "space.nc")
+    space = sl.load_workspace(tmp_path / "space.nc")
+    assert space.given == names
+    assert np.count_nonzero(plan.solved != level.solved) > 50
+    levels = space.levels()
+    np.testing.assert_array_equal(levels(places) >= 0.0, plan.solved)
+    tension = plan.chord_tension[plan.solved]
+    distance = np.minimum(tension - 5.0, 90.0 - tension).min(axis=1)
+    np.testing.assert_allclose(levels.details(places).margin[plan.solved], distance, rtol=1e-12, atol=1e-9)
+    assert "yaw of −1.146" in str(space)
+    frequency = sl.modes(plan.state).frequency[plan.solved, 0]
+    middle = sl.LeastFrequency(float(np.median(frequency)) + 1e-6)
+    stiffer = sl.workspace(robot, BOX, criteria=[middle], orientations=turned, given=names, cells=4, refine=False)
+    found = stiffer.levels()(places)[plan.solved] >= 0.0
+    np.testing.assert_array_equal(found, frequency >= middle.limit)
+    assert 0 < found.sum() < found.size
+
+
+@pytest.mark.parametrize(
+    ("robot", "names", "told"),
+    [
+        (FOUR, ("x", "y", "yaw", "level"), "without z"),
+        (FOUR, ("x", "y", "z"), "x, y, z"),
+        (FOUR, ("x", "y", "z", "roll"), "'roll'"),
+        (sl.load_robot("cogiro"), ("x", "y", "z", "yaw"), "('x', 'y', 'z', ...)"),
+    ],
+)
+def test_given_values_that_do_not_fit_are_refused(robot: sl.Robot, names: Any, told: str) -> None:
+    with refused("given", told):
+        sl.workspace(robot, BOX, given=names, cells=4)
 
 
 def test_tensions_without_a_value_are_outside(monkeypatch: pytest.MonkeyPatch) -> None:

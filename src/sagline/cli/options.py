@@ -243,6 +243,13 @@ POSE = converted(
     "Position [m] and angles about z, y, x [degrees]. Default: middle of the robot's test box.",
     "pose_of_text",
 )
+GIVEN: Any = converted(
+    None,
+    "NAMES",
+    "Given values of a platform with fewer cables than degrees of freedom: 'x,y,z,yaw' or 'x,y,z,level'. "
+    "Default: x, y, z and, with four cables, the tension level.",
+    lambda text, item: tuple(name.strip() for name in text.split(",")),
+)
 LOSS_TIME: float | None = quantity(
     None, "TIME", "Loss time [s] of the cable material: axial stiffness EA (1 + i omega TIME).", "s", low=0.0
 )

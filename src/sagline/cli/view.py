@@ -74,6 +74,7 @@ def view(
         None, "NUMBER", "Natural mode to animate at the start: 1, 2, ..., or 'massless 1' for massless cables."
     ),
     wrench: Any = opt.WRENCH,
+    given: Any = opt.GIVEN,
     payload: float | None = opt.PAYLOAD,
     address: ServerOptions = ServerOptions(),
 ) -> int:
@@ -101,11 +102,11 @@ def view(
     found = run if run is not None and _is_calibration(run) else None
     if found is None and Path(robot).suffix.lower() == ".nc":  # not a robot file; the reader raises the error
         found = Path(robot)
-    alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
-    given = [item for item, value in alone.items() if value is not None]
-    if (run is not None or log is not None or found is not None) and given:
+    alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode, "--given": given}
+    own = [item for item, value in alone.items() if value is not None]
+    if (run is not None or log is not None or found is not None) and own:
         raise sl.InvalidValueError(
-            given[0], "given with a run", "a robot alone", "A run has its own values: leave one out."
+            own[0], "given with a run", "a robot alone", "A run has its own values: leave one out."
         )
     if beside is not None and (found is not None or (run is None and log is None)):
         step = "Give both: sagline view cogiro run_a.nc --beside run_b.nc"
@@ -114,7 +115,7 @@ def view(
         return _view_log(log, robot if log is run else None, address, live=live, truth=truth, beside=beside)
     if found is not None:
         return _view_calibration(found, robot if found is run else None, address)
-    start = {"pose": pose, "mode": _mode(mode), "wrench": wrench}
+    start = {"pose": pose, "mode": _mode(mode), "wrench": wrench, "given": given}
     machine = opt.robot_with_payload(robot, payload)
     if run is not None:
         return _view_run(machine, run, address, beside)
@@ -125,9 +126,9 @@ def view_robot(
     robot: sl.Robot, name: str | Path, address: ServerOptions, mass: float | None = None, **start: Any
 ) -> int:
     """Serve the page of a robot until Ctrl-C. `mass`: platform with payload [kg]. Returns the exit code."""
-    from sagline.kinematics.inverse_rows import given_codes
+    from sagline.workspaces.balanced import check_given
 
-    given_codes(robot, None)  # raises an error if the pose cannot be computed from a position
+    check_given(robot, start.get("given"))  # raises an error if the pose cannot be computed from a position
     Source = _viewer()
     if start.get("mode"):
         _check_mode(robot, **start)
@@ -288,15 +289,14 @@ def _mode(text: str | None) -> str:
     return words
 
 
-def _check_mode(robot: sl.Robot, pose: sl.Pose | None, mode: str, wrench: Any) -> None:
+def _check_mode(robot: sl.Robot, pose: sl.Pose | None, mode: str, wrench: Any, given: Any = None) -> None:
     """Reject `mode` if the modes at `pose` do not include it. If there are no modes, the page states the reason."""
     from sagline.robot.reach import home_pose
     from sagline.viewer.features.modes import UP_TO, range_of_modes
     from sagline.viewer.swing import mode_of
 
-    found = sl.vibration(
-        sl.inverse(robot, home_pose(robot) if pose is None else pose, wrench=wrench).state, up_to=UP_TO
-    )
+    plan = sl.inverse(robot, home_pose(robot) if pose is None else pose, wrench=wrench, given=given)
+    found = sl.vibration(plan.state, up_to=UP_TO)
     if found.status is sl.VibrationStatus.SOLVED and mode_of(found, mode) is None:
         allowed = f"{range_of_modes(found)}, below {UP_TO:g} Hz"
         raise sl.InvalidValueError("--mode", repr(mode), allowed, "Choose a mode of the list on the page.")

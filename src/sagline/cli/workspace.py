@@ -115,6 +115,7 @@ def workspace(
         "Hull from the exact margin, from its lower bound (inner) or from its upper bound (outer).",
         "--hull",
     ),
+    given: Any = opt.GIVEN,
     model: str = opt.MODEL,
     files: opt.Files = opt.Files(),
 ) -> int:
@@ -145,7 +146,7 @@ def workspace(
         check_provable(robot)
     with working(f"{robot.name}: workspace") as line:
         how: dict[str, Any] = {"model": cable, "cells": cells, "hull": hull.value, "progress": line.progress}
-        space = sl.workspace(robot, box, loads, orientations=sl.Tilts(tilt), criteria=criteria, **how)
+        space = sl.workspace(robot, box, loads, orientations=sl.Tilts(tilt), criteria=criteria, given=given, **how)
         proof = None
         if to_prove is not None:
             stage, inside = line.stage(f"{robot.name}: proof"), sl.PoseBox(to_prove.low, to_prove.high, tilt)

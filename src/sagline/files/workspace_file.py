@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from attrs import fields
@@ -19,6 +19,7 @@ from sagline.files.netcdf import Format, choice_attributes, choice_of
 from sagline.files.robot_file import parse_robot
 from sagline.files.variables import Quantity, check_indices, check_variables, fields_of, variables_of_result
 from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere
+from sagline.kinematics.inverse_rows import CODES, Given
 from sagline.robot.pose import Pose, PoseBox
 from sagline.tension.methods import methods_by_name
 from sagline.workspaces import criteria
@@ -193,6 +194,8 @@ def _pack(space: Workspace) -> Dataset:
     }
     if space.moment_arm is not None:
         attributes |= {"moment_arm": space.moment_arm, "moment_arm_units": "m"}
+    if space.given is not None:
+        attributes["given"] = ", ".join(space.given)
     if (near := space.nearest) is not None:
         said = {"position": near.pose.position.tolist(), "quaternion": near.pose.quaternion.tolist()}
         said |= {name: getattr(near, name) for name in ("level", "margin", "criterion", "cables", "reason")}
@@ -230,8 +233,14 @@ def _unpack(path: FilePath, data: Dataset) -> Workspace:
         surface=Surface(**found.pop("surface")),
         open_faces=tuple(open_faces.split(", ")) if open_faces else (),
         nearest=_nearest(attributes["nearest"]) if "nearest" in attributes else None,
+        given=_given(attributes["given"]) if "given" in attributes else None,
         **found,
     )
+
+
+def _given(text: str) -> tuple[Given, ...]:
+    """Names of the given values of an underconstrained platform from the text of the file."""
+    return tuple(cast(Given, choice(name, "given", CODES)) for name in text.split(", "))
 
 
 def _nearest(text: str) -> Nearest:

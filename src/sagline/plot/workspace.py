@@ -320,7 +320,9 @@ def _place(space: Workspace) -> Pose:
         return Pose.from_quaternion(0.5 * (box.low + box.high), turn)
     deepest = np.unravel_index(int(np.argmax(space.level)), space.level.shape)
     pose = Pose.from_quaternion([float(axis[k]) for axis, k in zip(space.axes, deepest, strict=True)], turn)
-    return inverse(space.robot, pose).state.pose if is_underconstrained(space.robot) else pose
+    if not is_underconstrained(space.robot):
+        return pose
+    return inverse(space.robot, pose, given=space.given).state.pose
 
 
 def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:

@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
+from functools import partial
 from os import PathLike, fspath
 from typing import Any, NamedTuple, TypeVar
 
@@ -15,6 +16,7 @@ import viser
 from sagline.calibration.result import Calibration
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
+from sagline.kinematics.inverse_rows import Given
 from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
@@ -100,11 +102,13 @@ class Page:
         found: Calibration | None = None,
         source: Source | None = None,
         beside: Beside | None = None,
+        given: tuple[Given, ...] | None = None,
         stopping: threading.Event | None = None,
     ) -> None:
         """Build the page.
 
-        `beside` is a second run of the robot with the same clock. `stopping`, when set, ends `serve`.
+        `beside` is a second run of the robot with the same clock. `given`: given values of an underconstrained
+        platform, as in `inverse`. `stopping`, when set, ends `serve`.
         Other arguments: see the class.
         """
         self.server, self.robot, self.wrench = server, robot, wrench
@@ -117,7 +121,8 @@ class Page:
         server.on_client_disconnect(self.channel.disconnect)
         home = home_pose(robot) if played is None else played.at(0.0).pose
         self.home = home if pose is None else pose
-        self.panel = ControlPanel(server, robot, self.scale, self.refresh, lambda: self.later(self._forget))
+        forget = partial(self.later, self._forget)
+        self.panel = ControlPanel(server, robot, self.scale, self.refresh, forget, given)
         self.scene = RobotScene(server.scene, robot, self.home)
         self.extent = self.scene.extent(self.home)
         self.framing = Framing(server, *self.extent)

@@ -12,6 +12,7 @@ import viser
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
+from sagline.kinematics.inverse_rows import Given
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
@@ -48,9 +49,10 @@ class ControlPanel:
         scale: TensionScale,
         changed: Callable[[], None],
         forget: Callable[[], None],
+        given: tuple[Given, ...] | None = None,
     ) -> None:
         """Build the panels. Any thread calls `changed` after a change of a value, and `forget` to reset the history."""
-        self._gui, self._robot, self._limits = server.gui, robot, scale
+        self._gui, self._robot, self._limits, self._given = server.gui, robot, scale, given
         self._changed, self._forget = changed, forget
         self.method_name = next(iter(METHODS))
         self._by_hand: ByHand | None = None
@@ -109,6 +111,7 @@ class ControlPanel:
             tension=self._tension(),
             sag_scale=_slid(self._sag_scale),
             error_scale=_slid(self._error_scale),
+            given=self._given,
         )
 
     def _tension(self) -> TensionMethod:

@@ -16,6 +16,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse
+from sagline.kinematics.inverse_rows import Given
 from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
@@ -85,6 +86,7 @@ class Settings:
     tension: TensionMethod = DEFAULT.alone
     sag_scale: float = 1.0  # factor on the drawn sag, >= 0
     error_scale: float = 1.0  # factor on the drawn position error, >= 0
+    given: tuple[Given, ...] | None = None  # given values of an underconstrained platform, as in `inverse`
 
     @property
     def changes(self) -> tuple[float, float, float]:
@@ -176,9 +178,9 @@ def snapshot_at(
     """Solution at rest at a pose, for a robot to which the changes of the settings have already been applied."""
     reference = _remembered(previous, settings.tension)
     if is_underconstrained(robot):  # the rotation follows from the balance, and does not depend on the previous pose
-        pose = Pose(pose.position, np.eye(3))
+        pose = Pose.from_euler(pose.position, given_yaw(pose, settings.given), 0.0, 0.0)
     try:
-        plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
+        plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference, given=settings.given)
     except CableGeometryError as error:
         reason = "" if robot.winches is None else str(error).removeprefix("pose, ")
         return Snapshot(robot, pose, None, None, reason, reference)
@@ -186,6 +188,11 @@ def snapshot_at(
         pose = plan.state.pose
     approximate = not isinstance(settings.model, Catenary) and bool(plan.feasible)
     return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None, "", reference)
+
+
+def given_yaw(pose: Pose, given: tuple[Given, ...] | None) -> float:
+    """Yaw of a pose [rad], if it is a given value of an underconstrained platform; otherwise 0."""
+    return float(pose.rotation.as_euler("ZYX")[0]) if given is not None and "yaw" in given else 0.0
 
 
 def _remembered(previous: Plan | None, tension: TensionMethod) -> Array | None:

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.numbers import counted, n
+from sagline.kinematics.inverse_rows import Given
 from sagline.robot.robot import Robot, without_cables
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer.readout import color_key, html_block
@@ -77,6 +78,7 @@ class WorkspaceQuery(NamedTuple):
     model: CableModel
     wrenches: WrenchSet
     broken: tuple[int, ...] = ()  # numbers of the broken cables
+    given: tuple[Given, ...] | None = None  # given values of an underconstrained platform, as in `inverse`
 
     @property
     def without(self) -> str:
@@ -92,7 +94,9 @@ class WorkspaceQuery(NamedTuple):
         """Levels, whose change of sign is the boundary."""
         robot = without_cables(self.robot, *self.broken) if self.broken else self.robot
         margin, way = (LeastMargin(),), MinimumNorm()
-        levels = _NumberedLevels(robot, self.wrenches, self.orientations, margin, self.model, way, None, None)
+        held = None if self.broken else self.given
+        about = self.wrenches, self.orientations, margin, self.model, way, None
+        levels = _NumberedLevels(robot, *about, given=held)
         levels.numbers = np.append(np.delete(np.arange(self.robot.cable_count), self.broken), -1)
         return levels
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Final
 
@@ -14,7 +15,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.kernels import codes
 from sagline.kinematics.inverse import inverse
-from sagline.kinematics.inverse_rows import decide_stability, given_codes, solve_underconstrained_rows
+from sagline.kinematics.inverse_rows import Given, decide_stability, given_codes, solve_underconstrained_rows
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.equilibrium import cables_of_results, limited_tension
 from sagline.robot.pose import Pose
@@ -34,9 +35,9 @@ class BalancedMargins:
     gives no tension outside the limits either, the margin is -infinity.
     """
 
-    def __init__(self, robot: Robot, wrenches: WrenchSet, model: CableModel) -> None:
-        """Prepare the robot without limits, and the loads."""
-        self._given = given_codes(robot, None)  # raises an error if no given values are defined
+    def __init__(self, robot: Robot, wrenches: WrenchSet, model: CableModel, given: Sequence[Given] | None) -> None:
+        """Prepare the robot without limits, and the loads. `given`: as in `inverse`."""
+        self._given, self._names = given_codes(robot, given), given
         self._robot, self._model, self._loads = robot, model, loads_of(wrenches)
         self._unlimited = robot.replace(tension_min=0.0, tension_max=np.inf)
 
@@ -82,11 +83,26 @@ class BalancedMargins:
 
     def reason(self, pose: Pose) -> tuple[tuple[int, ...], str]:
         """Blocking cables, and the reason why the single `pose` is infeasible under the first such load."""
-        plans = (inverse(self._robot, pose, self._model, wrench=load) for load in self._loads)
+        plans = (inverse(self._robot, pose, self._model, wrench=load, given=self._names) for load in self._loads)
         plan = next((plan for plan in plans if not plan.solved), None)
         if plan is None:
             return (), "an equilibrium exists under every load"
         return tuple(np.flatnonzero(plan.blocking).tolist()), PoseStatus(int(plan.status)).text
+
+
+def check_given(robot: Robot, given: Sequence[Given] | None) -> tuple[Given, ...] | None:
+    """Checked names of the given values. The position of the platform must be one of them."""
+    codes_of_names = given_codes(robot, given)
+    if given is None or codes_of_names is None:
+        return None
+    normal = np.zeros(3) if robot.plane_normal is None else np.abs(robot.plane_normal)
+    place: tuple[Given, ...] = ("x", "y", "z")
+    missing = [name for name, share in zip(place, normal, strict=True) if share < 0.5 and name not in given]
+    if missing:
+        step = "Name the position, and for further cables yaw or level."
+        allowed = f"{', '.join(place)} among the given values of a workspace"
+        raise InvalidValueError("given", f"without {', '.join(missing)}", allowed, step)
+    return tuple(given)
 
 
 def check_arguments(robot: Robot, orientations: Orientations, hull: str, moment_arm: float | None) -> None:

@@ -16,6 +16,7 @@ from sagline.core.arrays import Array, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
+from sagline.kinematics.inverse_rows import Given as GivenValue
 from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
@@ -53,6 +54,7 @@ class Given:
     rows: Array
     margin: Array
     cable: Indices
+    given: tuple[GivenValue, ...] | None = None
 
     def __len__(self) -> int:
         """Number of poses."""
@@ -80,7 +82,7 @@ class Given:
     def planned(self, model: CableModel) -> Plan:
         """Tensions and lengths of another cable model at the K poses."""
         start = Pose._adopt(self.rows[self.held, :3], self.rows[self.held, 3:])
-        return inverse(self.robot, start, model, self.tension, self.wrench)
+        return inverse(self.robot, start, model, self.tension, self.wrench, given=self.given)
 
     @property
     def state(self) -> Equilibrium:

@@ -15,6 +15,7 @@ from sagline.core.progress import blocks
 from sagline.core.results import Result
 from sagline.kernels import codes
 from sagline.kinematics.inverse import inverse
+from sagline.kinematics.inverse_rows import Given as GivenValue
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
@@ -70,6 +71,7 @@ class Levels:
         moment_arm: Lever arm as in `margin` [m].
         held: For a planar workspace, the normal axis and the coordinate of its plane [m]. Otherwise None.
         on_block: Function that is called after each block with the number of poses in the block.
+        given: Given values of an underconstrained platform, as in `inverse`; None for its default.
         hull: Margin to use: "exact" for its value, "inner" for its lower bound, "outer" for its upper bound.
         middle: Middle of the wrench set, shape (6,); the tensions balance this wrench.
     """
@@ -84,6 +86,7 @@ class Levels:
     held: tuple[int, float] | None = None
     on_block: Callable[[int], None] | None = None
     hull: Hull = "exact"
+    given: tuple[GivenValue, ...] | None = None
 
     def __post_init__(self) -> None:
         """Prepare the margin."""
@@ -126,7 +129,7 @@ class Levels:
     def _margins_under(self, wrenches: WrenchSet) -> MarginRows | BalancedMargins:
         """Margins of a wrench set as a function of pose rows."""
         if is_underconstrained(self.robot):
-            return BalancedMargins(self.robot, wrenches, self.model)
+            return BalancedMargins(self.robot, wrenches, self.model, self.given)
         return MarginRows(self.robot, wrenches, self.model, self.moment_arm)
 
     def _block(self, positions: Array) -> Details:
@@ -143,7 +146,7 @@ class Levels:
         rows = self.orientations.at(positions, rotation)
         bracket = self._margins.rows(rows)
         margin = {"exact": bracket.value, "inner": bracket.low, "outer": bracket.high}[self.hull]
-        given = Given(self.robot, self.model, self.tension, self.middle, rows, margin, bracket.cable)
+        given = Given(self.robot, self.model, self.tension, self.middle, rows, margin, bracket.cable, self.given)
         level, criterion = np.full(len(rows), np.inf), np.zeros(len(rows), dtype=np.int64)
         cable = np.array(bracket.cable, dtype=np.int64)
         for index, (one, scale) in enumerate(zip(self.criteria, self._scales, strict=True)):
@@ -353,12 +356,13 @@ def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ..
     criterion = levels.criteria[index]
     if margin >= 0.0:
         if np.isinf(details.level[0]):
-            how = PoseStatus(int(inverse(levels.robot, pose, levels.model, levels.tension, levels.middle).status))
-            return own, f"{at} {type(levels.tension).__name__} finds no tensions for {criterion.title}: {how.text}"
+            plan = inverse(levels.robot, pose, levels.model, levels.tension, levels.middle, given=levels.given)
+            how = PoseStatus(int(plan.status)).text
+            return own, f"{at} {type(levels.tension).__name__} finds no tensions for {criterion.title}: {how}"
         short = -float(details.level[0]) * criterion.scale(levels.robot)
         return own, f"{at} the {criterion.title} fails by {n(short, '.3g', criterion.unit)}{_of(own)}"
     if is_underconstrained(levels.robot) and np.isinf(margin):
-        cables, why = BalancedMargins(levels.robot, levels.wrenches, levels.model).reason(pose)
+        cables, why = BalancedMargins(levels.robot, levels.wrenches, levels.model, levels.given).reason(pose)
         return cables, f"{at}{_of(cables)}: {why}"
     if is_underconstrained(levels.robot):
         return own, f"{at} a tension of the equilibrium is outside its limits by {n(-margin, '.3g', 'N')}{_of(own)}"

@@ -17,12 +17,13 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved, formats
-from sagline.robot.pose import PoseBox
+from sagline.kinematics.inverse_rows import Given
+from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import DEFAULT, method_of
-from sagline.workspaces.balanced import check_arguments
+from sagline.workspaces.balanced import check_arguments, check_given
 from sagline.workspaces.boundary import MOST_CELLS, boundary, uncertain_volume
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_continuous
@@ -98,6 +99,7 @@ class Workspace(Result, Saved):
         z: Coordinates of the nodes along z, shape (Z,).
         level: Smallest value of the criteria, each divided by its scale, at these nodes, >= 0 inside, shape (X, Y, Z).
         nearest: The pose nearest to feasibility if the workspace is empty; otherwise None.
+        given: Given values of an underconstrained platform, as in `inverse`; None for its default.
     """
 
     robot: Robot
@@ -123,6 +125,7 @@ class Workspace(Result, Saved):
     z: Array
     level: Array
     nearest: Nearest | None
+    given: tuple[Given, ...] | None = None
 
     @property
     def axes(self) -> tuple[Array, Array, Array]:
@@ -168,6 +171,7 @@ class Workspace(Result, Saved):
             self.moment_arm,
             flat_axis(self.box),
             hull=self.hull,
+            given=self.given,
         )
 
     def __str__(self) -> str:
@@ -221,7 +225,11 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
 def orientations_text(space: Workspace) -> str:
     """Text of the orientations of a workspace."""
     if is_underconstrained(space.robot):
-        return f"rotation from the balance of {counted(space.robot.cable_count, 'cable')}"
+        text = f"rotation from the balance of {counted(space.robot.cable_count, 'cable')}"
+        if space.given is None or "yaw" not in space.given:
+            return text
+        turn = Pose.from_quaternion(np.zeros(3), space.orientations.quaternion[0]).rotation.as_euler("ZYX")[0]
+        return f"{text} with a yaw of {n(np.degrees(turn), '.4g', '°')}"
     return str(space.orientations)
 
 
@@ -259,6 +267,7 @@ def workspace(
     refine: bool | int = True,
     moment_arm: float | None = None,
     hull: Hull = "exact",
+    given: Sequence[Given] | None = None,
     progress: Progress | None = None,
 ) -> Workspace:
     """Workspace: the positions at which the cables can balance every load of a set, and all criteria are met.
@@ -288,6 +297,8 @@ def workspace(
         moment_arm: Lever arm that converts moments to forces in the margin [m]; None for the mean lever arm.
         hull: Margin that determines the boundary. "exact": its value. "inner": its lower bound; every position inside
             is proved feasible. "outer": its upper bound; every position outside is proved infeasible.
+        given: Given values of an underconstrained platform, as in `inverse`: the position, and with four cables "yaw"
+            or "level". The yaw is that of `orientations`. None: "level" with four cables.
         progress: Function that is called from time to time with the number of finished poses and the expected total.
 
     Returns:
@@ -320,7 +331,8 @@ def workspace(
     chosen = choice(hull, "hull", get_args(Hull))
     if is_underconstrained(robot):
         check_arguments(robot, turned, chosen, arm)
-    levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box), hull=chosen)
+    held = check_given(robot, given)
+    levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box), hull=chosen, given=held)
     levels.on_block = None if report is None else _progress_of(report, region.cells)
     found = boundary(levels, region.low, region.high, region.cells, refine)
     surface, components = found.surface, found.components
@@ -354,6 +366,7 @@ def workspace(
         z=found.grid.z,
         level=found.grid.values,
         nearest=None if len(surface.faces) else nearest_to(levels, found.grid, region.box.low, region.box.high),
+        given=held,
     )
 
 

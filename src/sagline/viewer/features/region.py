@@ -11,7 +11,7 @@ from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
-from sagline.robot.reach import LEVEL, is_underconstrained
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.viewer import workspace
 from sagline.viewer.feature import BackgroundTask, Feature, View
@@ -21,6 +21,7 @@ from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Marks, picture_of
+from sagline.viewer.snapshot import given_yaw
 from sagline.viewer.tension_scale import force_unit
 from sagline.workspaces.levels import Levels, Plane, slice_of
 from sagline.workspaces.region import Region, region_of
@@ -173,8 +174,10 @@ class RegionFeature(Feature):
         center = np.zeros(6) if wrench is None else np.array(wrench)
         center += 0.0 if push is None else push.load(snapshot.robot, snapshot.pose)
         loads = WrenchBox(_load(self._force, "N"), _load(self._moment, "N m"), center)
-        turn = LEVEL if is_underconstrained(snapshot.robot) else snapshot.pose.quaternion
-        return workspace.WorkspaceQuery(snapshot.robot, locked(np.array(turn)), model, loads, broken)
+        turn, given = snapshot.pose.quaternion, view.settings.given if view.played is None else None
+        if is_underconstrained(snapshot.robot):
+            turn = Pose.from_euler(np.zeros(3), given_yaw(snapshot.pose, given), 0.0, 0.0).quaternion
+        return workspace.WorkspaceQuery(snapshot.robot, locked(np.array(turn)), model, loads, broken, given)
 
     def _prepare(self, query: workspace.WorkspaceQuery) -> tuple[Levels, Region]:
         """Levels and region, created again if the query has changed."""

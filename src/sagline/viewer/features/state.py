@@ -22,7 +22,7 @@ from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page, Source
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block
-from sagline.viewer.snapshot import ByHand, Settings, Snapshot
+from sagline.viewer.snapshot import ByHand, Settings, Snapshot, given_yaw
 from sagline.viewer.tension_scale import number_text
 
 FIRST: Final = -0.9  # order among the controls: above all controls except those of the played motion
@@ -206,7 +206,8 @@ def _weighed(mass: float) -> str:
 def _planned(snapshot: Snapshot, view: View) -> list[str]:
     """Lines of Python for the plan of a pose."""
     settings, pose = view.settings, snapshot.pose
-    made = [f"pose = sl.Pose.from_euler({_plain(pose.position)}, 0, 0, 0)"]
+    yaw = number_text(given_yaw(pose, settings.given), ".17g")
+    made = [f"pose = sl.Pose.from_euler({_plain(pose.position)}, {yaw}, 0, 0)"]
     underconstrained = is_underconstrained(snapshot.robot)  # its rotation is a result
     if np.any(pose.quaternion[:3] != 0.0) and not underconstrained:
         angles = ", ".join(number_text(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
@@ -217,6 +218,7 @@ def _planned(snapshot: Snapshot, view: View) -> list[str]:
     arguments = [
         f"model={_constructor(settings.model)}",
         *([] if underconstrained else [f"tension={_constructor(settings.tension)}"]),
+        *([] if settings.given is None else [f"given={settings.given}"]),
         *([] if view.wrench is None else [f"wrench={_plain(view.wrench)}"]),
         *([] if snapshot.previous is None else [f"previous={_plain(snapshot.previous)}"]),
     ]
