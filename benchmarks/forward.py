@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from rich.console import Console
@@ -16,6 +17,9 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from benchmarks.measure import Row, best_of_calls, best_seconds, one_core, show
 from sagline.core.arrays import Array, Flags
+from sagline.kernels.forward.sensitivity import sensitivities_of_states
+from sagline.statics.slopes import KernelStates
+from sagline.statics.stiffness import sensitivity_arrays
 from tests.kinematics.feasible import angle_error, feasible_plan, motion_between, moved, position_error
 
 BOX_POSES = 10_000
@@ -127,6 +131,18 @@ def speed(share: float) -> Iterator[Row]:
     yield Row("ForwardSolver.step_into, tracking", "", f"{1e6 * time:.1f} µs")
 
 
+def stiffnesses(share: float) -> Iterator[Row]:
+    """Times of stiffness and all sensitivities: the kernel alone, arrays of poses, and single states."""
+    for name in ("cogiro", "ipanema-2-pulleys"):
+        state = plan_of(sl.load_robot(name), 500, seed=7).state
+        arguments, one = next(KernelStates.of(state).parts(sensitivity_arrays(state))), state[0]
+        alone = best_seconds(partial(sensitivities_of_states, *arguments)) / len(state)
+        batch = best_seconds(partial(sl.stiffness, state)) / len(state)
+        single = best_of_calls(partial(sl.stiffness, one), calls=100)
+        measured = f"{1e6 * alone:.1f} µs; {1e6 * batch:.1f} µs; {1e6 * single:.0f} µs"
+        yield Row(f"`stiffness` of {name}: kernel alone per state; with arrays; one state", "≤ 5 µs; ; ", measured)
+
+
 def derivatives(share: float) -> Iterator[Row]:
     """Sensitivities, compared with central differences that are extrapolated from two step sizes."""
     robot = sl.load_robot("cogiro")
@@ -166,7 +182,7 @@ def main(share: float = 1.0) -> list[Row]:
     one_core()
     console = Console(stderr=True)
     rows: list[Row] = []
-    for part in (far_starts, without_start, speed, derivatives):
+    for part in (far_starts, without_start, speed, stiffnesses, derivatives):
         console.print(f"[dim]{(part.__doc__ or '').splitlines()[0]}[/dim]")
         for row in part(share):
             console.print(f"[dim]  {row.quantity}: {row.measured}[/dim]")

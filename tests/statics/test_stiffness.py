@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.core.arrays import Array
+from sagline.statics.stiffness import compliance_of, least_stiffness
 from tests.kinematics.feasible import center, feasible_plan, motion_between, unbalance
 
 MODELS = [sl.Catenary(), sl.Elastic(), sl.Parabolic(), sl.Empirical()]
@@ -129,3 +130,39 @@ def test_a_platform_suspended_at_one_point_has_no_compliance() -> None:
     assert found.status == sl.ForwardStatus.SINGULAR
     assert not found.stable
     assert np.isnan(sl.stiffness(found.state).compliance).all()
+
+
+@pytest.mark.parametrize("pattern", ["3R3T", "3T"])
+def test_compliances_are_inverses_for_the_free_motions_and_nan_if_singular(pattern: str) -> None:
+    freedom = COGIRO.replace(motion_pattern=pattern).freedom
+    rng = np.random.default_rng(8)
+    matrices = rng.normal(size=(50, 6, 6)) * np.outer([1.0, 1.0, 1.0, 1e3, 1e3, 1e3], [1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
+    matrices[1, :, 0] = matrices[1, :, 1]
+    matrices[2, 0, 0] = np.nan
+    found = compliance_of(freedom, matrices)
+    assert np.isnan(found[1:3]).all()
+    expected = freedom.T @ np.linalg.inv(freedom @ matrices[3:] @ freedom.T) @ freedom
+    np.testing.assert_allclose(found[3:], expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
+def test_least_stiffness_is_the_smallest_ratio_of_force_to_displacement() -> None:
+    freedom, rng = COGIRO.freedom, np.random.default_rng(9)
+    root = rng.normal(size=(20, 6, 6))
+    matrices = root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(6)
+    matrices[0] -= 5.0 * np.eye(6)
+    matrices[1] = np.nan
+    found = least_stiffness(freedom, matrices)
+    assert found[0] == 0.0
+    assert np.isnan(found[1])
+    largest = np.linalg.norm(np.linalg.inv(matrices[2:])[:, :3, :3], 2, axis=(1, 2))
+    np.testing.assert_allclose(found[2:], 1.0 / largest, rtol=1e-11)
+
+
+def test_a_slack_weightless_cable_leaves_a_basis_of_length_changes() -> None:
+    pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+    lengths = sl.inverse(COGIRO, pose, model=sl.Elastic()).unstrained_length + np.array([0.5, *[0.0] * 7])
+    found = sl.stiffness(sl.forward(COGIRO, lengths, pose, sl.Elastic()).state)
+    null = found.null_lengths
+    np.testing.assert_allclose(null.T @ null, np.eye(2), atol=1e-13)
+    np.testing.assert_allclose(found.length_sensitivity @ null, 0.0, atol=1e-11)
+    assert np.linalg.norm(null[0]) == pytest.approx(1.0)  # the slack cable has no effect

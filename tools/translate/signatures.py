@@ -36,6 +36,8 @@ MEMORY: Final = plain_tuple(F1, I1)
 ANSWERS: Final = plain_tuple(F3, CODES2, F2, F2, CODES1)
 GIVEN: Final = plain_tuple(F2, F2, F3, F2, F2, F2)
 FOUND: Final = plain_tuple(F2, F3, CODES2, F2, CODES1)
+STATES: Final = plain_tuple(F3, F4, F4, F3, F3, F3)
+SENSITIVITIES: Final = plain_tuple(F3, F4, F3, F3, F3, F3)
 CHAIN: Final = plain_tuple(F2, F2, F1)
 COURSE: Final = plain_tuple(F1, F2, F2, F2)
 COURSES: Final = plain_tuple(COURSE, COURSE, COURSE)
@@ -65,9 +67,10 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
     "decide_poses": {
         "": (MODEL, LIMITS, ROBOTS, F2, F2, I1, BOOL, MEMORY, ANSWERS, plain_tuple(F2, F2, F2, FLAGS2)),
     },
+    "compliances_of": {"": (F2, F3, MEMORY, F3)},
     "describe_states": {
-        "": (FORWARD, GIVEN, MEMORY, F3, F4, F4, F3),
-        "pulleys": (FORWARD_PULLEYS, GIVEN, MEMORY, F3, F4, F4, F3),
+        "": (FORWARD, ROBOTS, F2, F3, MEMORY, STATES),
+        "pulleys": (FORWARD_PULLEYS, ROBOTS, F2, F3, MEMORY, STATES),
     },
     "dynamic_stiffnesses": {"": (F3, F3, FLOAT, F2, F4, I4), "damped": (F3, C3, FLOAT, C2, C4, I4)},
     "exits_of_forces": {"": (F3, F1, F3, F3)},
@@ -87,6 +90,7 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
         "methods": (*INVERSE, BOOL, BOOL, ANSWERS, INT, INT),
     },
     "least_distances": {"": (F3, F2, I2, FLOAT, BOOL, F2, F2, F2, F2, F4)},
+    "least_stiffnesses": {"": (F2, F3, MEMORY, F1)},
     "lengths_at_frame_ends": {"": (TERMS, F2, F1, F1, F1, F1, F1, F2, F2)},
     "lengths_of_turns": {"": (F2,) * 4},
     "margins_of_poses": {"": (MODEL, LIMITS, ROBOTS, F2, F2, F2, MEMORY, F1)},
@@ -120,6 +124,10 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
             MEMORY,
             plain_tuple(CODES1, CODES1),
         ),
+    },
+    "sensitivities_of_states": {
+        "": (FORWARD, ROBOTS, F2, F3, MEMORY, STATES, SENSITIVITIES),
+        "pulleys": (FORWARD_PULLEYS, ROBOTS, F2, F3, MEMORY, STATES, SENSITIVITIES),
     },
     "stabilities_of_poses": {
         "": (FORWARD, ROBOTS, F2, I1, MEMORY, F3, CODES1),

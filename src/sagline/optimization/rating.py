@@ -19,7 +19,6 @@ from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.batch import largest_sags
-from sagline.kernels.forward.sensitivity import DATA, describe_states
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.inverse_rows import InverseRows, decide_rows
@@ -30,6 +29,7 @@ from sagline.optimization.search import latin_hypercube
 from sagline.robot.batch import has_routing
 from sagline.robot.pose import Pose, PoseBox, PoseLike
 from sagline.robot.robot import Robot
+from sagline.statics.slopes import KernelStates
 from sagline.statics.stiffness import least_stiffness
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.method import kernel_options
@@ -67,8 +67,10 @@ def distribute(
     found.results[tables.LENGTH :, lost] = np.nan
     tension = found.results[tables.TENSION].max(axis=-1)
     sag = _sag(model, robot.gravity, found.results, cables).max(axis=-1)
-    stiff = _stiffness(robot, model, found.results, (cables, poses, load), behind) if stiffness else None
-    return tension, sag, stiff
+    if not stiffness:
+        return tension, sag, None
+    states = KernelStates.of_rows((model.code, *model.parameters, behind or None), terms, poses, found.results)
+    return tension, sag, least_stiffness(robot.freedom, states.describe().found[0])
 
 
 def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Array:
@@ -84,21 +86,6 @@ def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Ar
     out = np.empty(length.size)
     largest_sags(model.terms(gravity), columns, out)
     return out.reshape(length.shape)
-
-
-def _stiffness(
-    robot: Robot, model: CableModel, results: Array, given: tuple[Array, Array, Array], behind: bool
-) -> Array:
-    """Least stiffness (N,): ratio of force to displacement of the center of mass in the softest direction [N/m]."""
-    cables, poses, load = given
-    count, m = cables.shape[:2]
-    matrices, levers = np.empty((count, 6, 6)), np.empty((count, m, 3))
-    blocks_of, slopes = np.empty((count, m, 3, 3)), np.empty((count, DATA, m, 3))
-    code = (model.code, *model.parameters, behind or None)
-    lengths = locked(np.ascontiguousarray(results[tables.LENGTH]))
-    terms = (robot.freedom, body_table(robot), cables, lengths, poses, load)
-    describe_states(code, terms, memory_for(m), matrices, blocks_of, slopes, levers)
-    return least_stiffness(robot.freedom, matrices)
 
 
 Margins: TypeAlias = Callable[[Array, Array], Array]  # (cable tables, pose rows) -> margins

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,12 +12,13 @@ from sagline.core.arrays import Array, Flags, locked
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
+from sagline.kernels.forward import sensitivity
+from sagline.kernels.memory import memory_for
 from sagline.robot.batch import first_of, robot_fields
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
-from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
+from sagline.statics.slopes import KernelStates, cable_slopes
 from sagline.statics.strings import strings_below, strings_of
 
-_SINGULAR = 1e-14  # smallest determinant of a regular matrix that is scaled to diagonal elements of 1
 # A squared frequency counts as zero if it is smaller than this share of the largest.
 NEUTRAL, UNSTABLE = 1e-13, 1e-10
 _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # [bytes], memory per cable and pose
@@ -128,58 +130,36 @@ def stiffness(state: Equilibrium) -> Stiffness:
         docs/model.md, section 6.
     """
     _check_state(state, _STIFFNESS_BYTES)
-    slopes = cable_slopes(state)
-    freedom = first_of(state.robot).freedom
-    compliance = compliance_of(freedom, slopes.matrix)
-    by_length = -compliance @ on_platform(slopes.by_length, slopes.levers)
+    given, arrays, m = KernelStates.of(state), sensitivity_arrays(state), state.cables.shape[-1]
+    for arguments in given.parts(arrays):
+        sensitivity.sensitivities_of_states(*arguments)
+    shape = state.pose.shape
+    compliance, by_data, by_frame, by_platform, tensions, null = arrays
+    data = [by_data[:, k].reshape(*shape, 6, m) for k in range(sensitivity.DATA)]
+    anchors = [array.reshape(*shape, 6, m, 3) for array in (by_frame, by_platform)]
     return Stiffness(
         state=state,
-        matrix=locked(slopes.matrix),
-        compliance=locked(compliance),
-        length_sensitivity=locked(by_length),
-        density_sensitivity=locked(-compliance @ on_platform(slopes.by_density, slopes.levers)),
-        stiffness_sensitivity=locked(-compliance @ on_platform(slopes.by_stiffness, slopes.levers)),
-        pulley_radius_sensitivity=locked(-compliance @ on_platform(slopes.by_radius, slopes.levers)),
-        dead_cable_sensitivity=locked(-compliance @ on_platform(slopes.by_dead, slopes.levers)),
-        cable_stiffness=locked(slopes.blocks),
-        frame_anchor_sensitivity=locked(_by_frame_anchor(slopes, compliance)),
-        platform_anchor_sensitivity=locked(_by_platform_anchor(state, slopes, compliance)),
-        tension_sensitivity=locked(_tension_by_length(state, slopes, by_length)),
-        null_lengths=locked(_null_space(freedom @ by_length)),
+        matrix=locked(given.found[0].reshape(*shape, 6, 6)),
+        compliance=locked(compliance.reshape(*shape, 6, 6)),
+        length_sensitivity=locked(data[sensitivity.BY_LENGTH]),
+        density_sensitivity=locked(data[sensitivity.BY_DENSITY]),
+        stiffness_sensitivity=locked(data[sensitivity.BY_STIFFNESS]),
+        pulley_radius_sensitivity=locked(data[sensitivity.BY_RADIUS]),
+        dead_cable_sensitivity=locked(data[sensitivity.BY_DEAD]),
+        cable_stiffness=locked(given.found[1].reshape(*shape, m, 3, 3)),
+        frame_anchor_sensitivity=locked(anchors[0]),
+        platform_anchor_sensitivity=locked(anchors[1]),
+        tension_sensitivity=locked(tensions.reshape(*shape, m, m)),
+        null_lengths=locked(null.reshape(*shape, m, null.shape[-1])),
     )
 
 
-def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """Sensitivity to frame anchors (..., 6, m, 3). A motion da of the frame end acts as -da of the platform end."""
-    columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
-    return np.stack(columns, axis=-1)
-
-
-def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Array) -> Array:
-    """Sensitivity to platform anchors (..., 6, m, 3). A change db shifts the end of the cable and its force by Q db."""
-    rotation = state.pose.matrix[..., None, :, :]
-    columns = []
-    for k in range(3):
-        end = np.broadcast_to(rotation[..., k], slopes.levers.shape)
-        wrench = on_platform((slopes.blocks @ end[..., None])[..., 0], slopes.levers)
-        wrench[..., 3:, :] += np.swapaxes(np.cross(end, slopes.force), -1, -2)
-        columns.append(-compliance @ wrench)
-    return np.stack(columns, axis=-1)
-
-
-def _tension_by_length(state: Equilibrium, slopes: CableSlopes, by_length: Array) -> Array:
-    """Derivatives (..., m, m) of the frame-end tension of cable i by L_j, with the platform in equilibrium."""
-    by_motion, own = tension_slopes(state, slopes)
-    found: Array = by_motion @ by_length + own[..., None] * np.eye(own.shape[-1])
-    return found
-
-
-def _null_space(matrix: Array) -> Array:
-    """Orthonormal basis (..., m, m - n) of the null space of matrices (..., n, m); NaN for a matrix with NaN."""
-    n, m = matrix.shape[-2:]
-    lost = np.isnan(matrix).any(axis=(-1, -2), keepdims=True)
-    rows: Array = np.linalg.svd(np.where(lost, 0.0, matrix), full_matrices=True)[2][..., min(n, m) :, :]
-    return np.where(lost, np.nan, np.swapaxes(rows, -1, -2))
+def sensitivity_arrays(state: Equilibrium) -> tuple[Array, ...]:
+    """Empty arrays that `sensitivities_of_states` fills."""
+    shape, n = state.cables.shape, first_of(state.robot).degrees_of_freedom
+    count, m = math.prod(shape[:-1]), shape[-1]
+    shapes = ((6, 6), (sensitivity.DATA, 6, m), (6, 3 * m), (6, 3 * m), (m, m), (m, max(m - n, 0)))
+    return tuple(np.empty((count, *one)) for one in shapes)
 
 
 @of_equilibrium
@@ -251,8 +231,13 @@ def _check_state(state: Equilibrium, cable_bytes: float) -> None:
 
 
 def compliance_of(freedom: Array, matrix: Array) -> Array:
-    """Compliance: inverse of the stiffness for the free motions, zero for all other motions; NaN if singular."""
-    return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
+    """Compliances (N, 6, 6): inverses of stiffnesses for the free motions, zero for all other motions.
+
+    NaN for a matrix that is singular or contains NaN.
+    """
+    found = np.empty(matrix.shape)
+    sensitivity.compliances_of(freedom, locked(np.ascontiguousarray(matrix)), memory_for(1), found)
+    return found
 
 
 def least_stiffness(freedom: Array, matrix: Array) -> Array:
@@ -260,31 +245,9 @@ def least_stiffness(freedom: Array, matrix: Array) -> Array:
 
     Arguments: `freedom`, free motions (n, 6); `matrix`, stiffnesses of the platform in world axes (N, 6, 6), or NaN.
     """
-    lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
-    own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T
-    own = 0.5 * (own + np.swapaxes(own, 1, 2))
-    size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
-    size[size == 0.0] = 1.0
-    balanced = own / (size[:, :, None] * size[:, None, :])  # makes forces and moments comparable
-    stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
-    compliance = compliance_of(freedom, matrix)[:, :3, :3]
-    known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))
-    given = np.where(known[:, None, None], compliance, np.eye(3))
-    largest = np.linalg.eigvalsh(0.5 * (given + np.swapaxes(given, 1, 2)))[:, -1]
-    return np.where(lost, np.nan, np.where(known, 1.0 / largest, 0.0))
-
-
-def _inverse(matrix: Array) -> Array:
-    """Inverse of every matrix; NaN for a matrix that is singular or contains NaN."""
-    unit = np.eye(matrix.shape[-1])
-    known = np.where(np.isnan(matrix).any(axis=(-1, -2), keepdims=True), 0.0, matrix)
-    diagonal = np.abs(np.einsum("...ii->...i", known))
-    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    # rows and columns are scaled so that forces and moments have similar magnitudes
-    balanced = known / (scale[..., :, None] * scale[..., None, :])
-    lost = np.abs(np.linalg.det(balanced))[..., None, None] < _SINGULAR
-    inverse: Array = np.linalg.inv(np.where(lost, unit, known))
-    return np.where(lost, np.nan, inverse)
+    found = np.empty(len(matrix))
+    sensitivity.least_stiffnesses(freedom, locked(np.ascontiguousarray(matrix)), memory_for(1), found)
+    return found
 
 
 def mass_matrix(state: Equilibrium) -> Array:

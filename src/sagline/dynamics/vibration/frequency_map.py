@@ -158,7 +158,7 @@ def _numbers_of_pose(
 ) -> tuple[float, ...]:
     """Compute the values of one pose, in the order of `FrequencyMap`; `lowest`: lowest massless frequency [Hz]."""
     freedom = model.freedom
-    rest = compliance_of(freedom, model.stiffness[row])[:3, :3]
+    rest = compliance_of(freedom, model.stiffness[row, None])[0, :3, :3]
     found = state_modes(model, row, up_to)
     if not found.number:
         return np.nan, lowest, np.nan, float(np.linalg.norm(rest, 2)), 0.0

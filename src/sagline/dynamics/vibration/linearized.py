@@ -20,7 +20,6 @@ from sagline.statics.slopes import (
     frame_end_forces,
     motions_of_ends,
     on_platform,
-    tension_slopes,
 )
 from sagline.statics.stiffness import mass_matrix, modes
 
@@ -161,7 +160,6 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     robot, slopes = state.one_robot, _solved_slopes(state)
     freedom, n, m = robot.freedom, len(robot.freedom), robot.cable_count
     freed = np.linalg.inv(freedom @ mass_matrix(state) @ freedom.T) @ freedom  # maps a wrench to the acceleration
-    tension_by_place, tension_by_length = tension_slopes(state, slopes)
     loss = _stretch_loss(state, slopes, damping.loss_time)
     by_motion, by_speed, tension_by_motion, tension_by_speed = loss
     drag = by_motion + _modal_drag(state, damping.modal_damping)
@@ -176,9 +174,9 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     B[speed, :m], B[speed, m:] = -freed @ by_speed, freed
     B[length, :m] = np.eye(m)
     C[:6, place] = freedom.T
-    C[tensions, place] = tension_by_place @ freedom.T
+    C[tensions, place] = slopes.tension_by_motion @ freedom.T
     C[tensions, speed] = tension_by_motion @ freedom.T
-    C[tensions, length] = np.diag(tension_by_length)
+    C[tensions, length] = np.diag(slopes.tension_by_length)
     C[6 + m :, length] = np.eye(m)
     D[tensions, :m] = np.diag(tension_by_speed)
     return A, B, C, D

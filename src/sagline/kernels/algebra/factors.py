@@ -109,6 +109,44 @@ def solve_general(matrix: Array, right: Array) -> bool:
     return True
 
 
+@kernel
+def invert_general(matrix: Array, inverse: Array) -> float:
+    """Fill the `inverse` (n, n) by Gauss elimination with partial pivoting. Destroys `matrix`. Returns the determinant.
+
+    If the determinant is 0 or NaN, the inverse is not valid.
+    """
+    n = matrix.shape[0]
+    determinant = 1.0
+    for i in range(n):
+        for j in range(n):
+            inverse[i, j] = 1.0 if i == j else 0.0
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if not abs(matrix[best, k]) > 0.0:
+            return 0.0
+        if best != k:
+            determinant = -determinant
+            for j in range(n):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+                inverse[k, j], inverse[best, j] = inverse[best, j], inverse[k, j]
+        pivot = matrix[k, k]
+        determinant *= pivot
+        share = 1.0 / pivot
+        for j in range(n):
+            matrix[k, j] *= share
+            inverse[k, j] *= share
+        for i in range(n):
+            ratio = matrix[i, k]
+            if i != k:
+                for j in range(n):
+                    matrix[i, j] -= ratio * matrix[k, j]
+                    inverse[i, j] -= ratio * inverse[k, j]
+    return determinant
+
+
 @formula
 def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
     """Make row `count` of a frame (.., d) orthogonal to the rows before it, which are orthonormal.
@@ -148,6 +186,40 @@ RANK = 1e-9  # least diagonal entry of R, relative to the row of the matrix, tha
 
 
 @formula
+def _reflect(reduced: Array, diagonals: Array, k: int, square: float) -> None:
+    """Make step `k` of a QR factorization in place. `square`: squared norm of row k from the diagonal on."""
+    n, m = reduced.shape
+    norm = math.sqrt(square)
+    first = reduced[k, k]
+    head = -math.copysign(norm, first)
+    factor = 1.0 / (norm * (norm + abs(first)))
+    diagonals[HEADS, k] = head
+    diagonals[FACTORS, k] = factor
+    reduced[k, k] = first - head
+    for j in range(k + 1, n):
+        total = 0.0
+        for i in range(k, m):
+            total += reduced[k, i] * reduced[j, i]
+        total *= factor
+        for i in range(k, m):
+            reduced[j, i] -= total * reduced[k, i]
+
+
+@kernel
+def reflect_rows(reduced: Array, diagonals: Array) -> None:
+    """QR factorization in place of a matrix (n, m) of any rank, as in `factorize`. A zero row has no reflection."""
+    n, m = reduced.shape
+    for k in range(n):
+        square = 0.0
+        for i in range(k, m):
+            square += reduced[k, i] * reduced[k, i]
+        diagonals[HEADS, k] = 0.0
+        diagonals[FACTORS, k] = 0.0
+        if square > 0.0:
+            _reflect(reduced, diagonals, k, square)
+
+
+@formula
 def factorize(reduced: Array, diagonals: Array) -> bool:
     """QR factorization in place; returns True if the matrix (n, m) has full rank.
 
@@ -164,20 +236,7 @@ def factorize(reduced: Array, diagonals: Array) -> bool:
             square += reduced[k, i] * reduced[k, i]
         if not square > RANK * RANK * (before + square):
             return False
-        norm = math.sqrt(square)
-        first = reduced[k, k]
-        head = -math.copysign(norm, first)
-        factor = 1.0 / (norm * (norm + abs(first)))
-        diagonals[HEADS, k] = head
-        diagonals[FACTORS, k] = factor
-        reduced[k, k] = first - head
-        for j in range(k + 1, n):
-            total = 0.0
-            for i in range(k, m):
-                total += reduced[k, i] * reduced[j, i]
-            total *= factor
-            for i in range(k, m):
-                reduced[j, i] -= total * reduced[k, i]
+        _reflect(reduced, diagonals, k, square)
     return True
 
 

@@ -505,6 +505,27 @@ def stiffness_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> Non
         fill_stiffness(rows, i)
 
 
+@formula
+def rise_of_exit(swivel: Swivel, x: float, y: float, z: float) -> Vector:
+    """Derivative of the height of the exit point by the force (`x`, `y`, `z`) at the exit point [m/N]."""
+    nx, ny, nz = swivel.x, swivel.y, swivel.z
+    along = x * nx + y * ny + z * nz
+    rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
+    across = math.sqrt(rx * rx + ry * ry + rz * rz)
+    inverse, share = 1.0 / max(across, TINY), 1.0 / max(math.sqrt(across * across + along * along), TINY)
+    rx, ry, rz = rx * inverse, ry * inverse, rz * inverse
+    sine, cosine = across * share, along * share
+    sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
+    turn = -swivel.radius * share * (sine * rz + cosine * nz)
+    # v/|F_p| = R tan(psi/2)/T is regular for a cable along its axis
+    swing = swivel.radius * share * math.tan(0.5 * math.atan2(across, along)) * sz
+    return (
+        turn * (sine * nx - cosine * rx) + swing * sx,
+        turn * (sine * ny - cosine * ry) + swing * sy,
+        turn * (sine * nz - cosine * rz) + swing * sz,
+    )
+
+
 DATA_STEP = 1e-4  # relative step of the differences by cable data
 
 

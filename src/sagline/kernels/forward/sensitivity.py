@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.factors import copy, extreme_eigenvalues
+from sagline.kernels.algebra.factors import copy, extreme_eigenvalues, invert_general, orthogonal_factor, reflect_rows
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
-from sagline.kernels.cable.swivel import force_slopes_of_swivel
+from sagline.kernels.cable.swivel import TINY, force_slopes_of_swivel, rise_of_exit, swivel_at
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.forward import FLAT
-from sagline.kernels.jit import entry, formula, glue
-from sagline.kernels.memory import Memory, block, vector
-from sagline.kernels.statics import symmetric_part
+from sagline.kernels.jit import entry, formula, glue, kernel
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.statics import matrix_along, symmetric_part
 
 # index of the quantity with respect to which the force is differentiated
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
@@ -59,46 +60,345 @@ def _describe_cable(
     _fill_in_world_axes(own.by_stiffness, rows, i, slopes[BY_STIFFNESS, i])
 
 
+@formula
+def _at_frame_end(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float, float, float]:
+    """Coefficients of the change of the frame-end tension of cable `i`.
+
+    Three for the change of the force on the platform end, world axes; one for the rise of the platform end [N/m]; one
+    for the change of the length [N/m]. H = T + T^2/(2 EA) - w z is constant along a cable.
+    """
+    horizontal, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
+    cx, cy = (rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]) if horizontal > 0.0 else (0.0, 0.0)
+    x, y = horizontal * cx, horizontal * cy
+    density, stiffness = material_at(cables, i)
+    weight = 0.0 if model.code == codes.ELASTIC else density * model.gravity
+    free = rows[g.LENGTH, i] if model.behind is None else rows[g.FREE_LENGTH, i]
+    down = z - weight * free
+    leaving = math.sqrt(horizontal * horizontal + down * down)
+    inverse = 1.0 / max(leaving, TINY)  # no division by zero for a cable without force
+    if model.behind is None:
+        return x * inverse, y * inverse, down * inverse, 0.0, -weight * down * inverse
+    at_end = math.sqrt(horizontal * horizontal + z * z)
+    share = 1.0 / (1.0 + leaving / stiffness)
+    along = share * (1.0 + at_end / stiffness) / max(at_end, TINY)
+    if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        rx, ry, rz = rise_of_exit(swivel_at(cables, i, model.gravity), x, y, down)
+    else:  # derivative of the height of the exit point, R cos psi d(psi)
+        radius, entering = pulley_at(cables, i).radius, pulley_at(cables, i).entry
+        cosine = rows[g.WRAP_COSINE, i]
+        raised = radius * entering * cosine * inverse
+        rx, ry, rz = raised * cosine * cx, raised * cosine * cy, -raised * entering * rows[g.WRAP_SINE, i]
+    lift = share * weight
+    return (
+        along * x + lift * rx,
+        along * y + lift * ry,
+        along * z + lift * rz,
+        -lift,
+        -lift * weight * rz,
+    )
+
+
+class _States(NamedTuple):
+    """Output arrays of the first derivatives at N equilibria."""
+
+    matrices: Array  # stiffness of the platform, (N, 6, 6)
+    blocks: Array  # stiffness of the platform end of each cable in world axes, (N, m, 3, 3)
+    slopes: Array  # derivatives of the force T of each cable with respect to its data, (N, DATA, m, 3)
+    levers: Array  # vectors from the center of mass to the platform ends, (N, m, 3)
+    forces: Array  # forces T on the platform ends, world axes, (N, m, 3)
+    tensions: Array  # derivatives of the frame-end tensions by six motions and the cable's length, (N, m, 7)
+
+
+@kernel
+def _fill_tension_slopes(
+    parts: tuple[float, float, float, float, float], block: Array, slope: Array, lever: Array, out: Array
+) -> None:
+    """Fill the derivatives (7,) of a frame-end tension by the platform motion and by the length of the cable."""
+    qx, qy, qz, by_rise, by_length = parts
+    x = qx * block[0, 0] + qy * block[1, 0] + qz * block[2, 0]
+    y = qx * block[0, 1] + qy * block[1, 1] + qz * block[2, 1]
+    z = qx * block[0, 2] + qy * block[1, 2] + qz * block[2, 2] + by_rise
+    out[0], out[1], out[2] = x, y, z
+    out[3] = lever[1] * z - lever[2] * y
+    out[4] = lever[2] * x - lever[0] * z
+    out[5] = lever[0] * y - lever[1] * x
+    out[6] = qx * slope[0] + qy * slope[1] + qz * slope[2] + by_length
+
+
+@glue
+def _describe_pose(
+    terms: f.ForwardTerms,
+    robots: tuple[Array, Array, Array],
+    poses: Array,
+    results: Array,
+    p: int,
+    work: tuple[Array, Array],
+    out: _States,
+) -> bool:
+    """Fill the outputs of pose `p`. False, and NaN, for straight cables and for a pose without lengths."""
+    code, k_h, k_p, behind = terms
+    rotation, rows = work
+    matrix, slopes = out.matrices[p], out.slopes[p]
+    if code == codes.STRAIGHT or math.isnan(results[tables.LENGTH, p, 0]):
+        matrix[:] = math.nan
+        out.blocks[p] = math.nan
+        slopes[:] = math.nan
+        out.levers[p] = math.nan
+        out.forces[p] = math.nan
+        out.tensions[p] = math.nan
+        return False
+    body, cables = f.row_of(robots[1], p), f.row_of(robots[2], p)
+    model = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
+    _fill_state(model, cables, body, poses[p], results, p, rotation, rows)
+    f.platform_stiffness(model, cables, rows, matrix)
+    for i in range(rows.shape[1]):
+        block, lever, force = out.blocks[p, i], out.levers[p, i], out.forces[p, i]
+        _describe_cable(model, cables, rows, i, block, slopes, lever)
+        force[0] = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
+        force[1] = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
+        force[2] = rows[g.VERTICAL, i]
+        parts = _at_frame_end(model, cables, rows, i)
+        _fill_tension_slopes(parts, block, slopes[BY_LENGTH, i], lever, out.tensions[p, i])
+    return True
+
+
 @entry
 def describe_states(
     model: f.ForwardTerms,
-    given: f.SampleArrays,
+    robots: tuple[Array, Array, Array],
+    poses: Array,
+    results: Array,
     memory: tuple[Array, Indices],
-    matrices: Array,
-    blocks: Array,
-    slopes: Array,
-    levers: Array,
+    found: tuple[Array, Array, Array, Array, Array, Array],
 ) -> None:
-    """Stiffness and sensitivities of N samples, NaN for straight cables and for lengths that are NaN.
+    """Stiffness and derivatives of cable forces at N equilibria, NaN for straight cables and for lengths that are NaN.
 
-    The arguments are the same as in `forward_poses`, with equilibria as initial poses. To be filled:
-
-    `matrices`: stiffness of the platform, (N, 6, 6). `blocks`: stiffness of every cable's platform end in world axes,
-    (N, m, 3, 3). `slopes`: derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3).
-    `levers`: vectors from the center of mass to the platform ends, (N, m, 3).
+    The arguments are the same as in `stabilities_of_poses`. `found`: arrays of `_States`, which are filled.
     """
-    batch = f.ForwardSamples(*given)
-    code, k_h, k_p, behind = model
-    count, m = batch.lengths.shape
+    rotation, rest = block(Memory(*memory), 3, 3)
+    rows, rest = block(rest, CABLE_ROWS, results.shape[2])
+    for p in range(poses.shape[0]):
+        _describe_pose(model, robots, poses, results, p, (rotation, rows), _States(*found))
+
+
+SINGULAR = 1e-14  # smallest determinant of a regular matrix that is scaled to diagonal elements of 1
+
+
+class _Sensitivities(NamedTuple):
+    """Output arrays of the sensitivities of N poses, which are those of `sagline.statics.Stiffness`."""
+
+    compliances: Array  # (N, 6, 6)
+    by_data: Array  # (N, DATA, 6, m)
+    by_frame: Array  # (N, 6, 3 m)
+    by_platform: Array  # (N, 6, 3 m)
+    tensions: Array  # (N, m, m)
+    null: Array  # (N, m, m - n)
+
+
+@kernel
+def _fill_compliance(free: Array, stiffness: Array, work: Array, compliance: Array) -> bool:
+    """Fill the `compliance` (6, 6): inverse of the stiffness for the free motions. False, and NaN, if it is singular.
+
+    `work`: (2 n + 1, n).
+    """
+    n = free.shape[0]
+    matrix, inverse, scale = work[:n], work[n : 2 * n], work[2 * n]
+    matrix_along(free, stiffness, matrix)
+    for j in range(n):  # forces and moments get similar magnitudes
+        scale[j] = 1.0 / math.sqrt(abs(matrix[j, j])) if abs(matrix[j, j]) > 0.0 else 1.0
+    for j in range(n):
+        for k in range(n):
+            matrix[j, k] *= scale[j] * scale[k]
+    if not abs(invert_general(matrix, inverse)) >= SINGULAR:
+        compliance[:] = math.nan
+        return False
+    for j in range(n):
+        for k in range(n):
+            inverse[j, k] *= scale[j] * scale[k]
+    for a in range(6):
+        for b in range(6):
+            total = 0.0
+            if n == 6:
+                total = free[a, a] * free[b, b] * inverse[a, b]
+            else:
+                for j in range(n):
+                    for k in range(n):
+                        total += free[j, a] * inverse[j, k] * free[k, b]
+            compliance[a, b] = total
+    return True
+
+
+@kernel
+def _multiply(sign: float, matrix: Array, right: Array, product: Array) -> None:
+    """Fill `product` (6, q) with `sign` times `matrix` (6, 6) times `right` (6, q)."""
+    for a in range(6):
+        c0, c1, c2 = sign * matrix[a, 0], sign * matrix[a, 1], sign * matrix[a, 2]
+        c3, c4, c5 = sign * matrix[a, 3], sign * matrix[a, 4], sign * matrix[a, 5]
+        for j in range(right.shape[1]):
+            product[a, j] = (
+                c0 * right[0, j] + c1 * right[1, j] + c2 * right[2, j]
+                + (c3 * right[3, j] + c4 * right[4, j] + c5 * right[5, j])
+            )  # fmt: skip
+
+
+@formula
+def _fill_wrench(wrenches: Array, j: int, lever: Array, x: float, y: float, z: float) -> None:
+    """Fill column `j` of `wrenches` (6, q) with the wrench of the force (`x`, `y`, `z`) at the platform end `lever`."""
+    wrenches[0, j] = x
+    wrenches[1, j] = y
+    wrenches[2, j] = z
+    wrenches[3, j] = lever[1] * z - lever[2] * y
+    wrenches[4, j] = lever[2] * x - lever[0] * z
+    wrenches[5, j] = lever[0] * y - lever[1] * x
+
+
+@glue
+def _fill_anchors(p: int, rotation: Array, state: _States, wrenches: Array, out: _Sensitivities) -> None:
+    """Fill the sensitivities to frame anchors and to platform anchors. `wrenches`: (6, 3 m)."""
+    compliance = out.compliances[p]
+    m = state.levers.shape[1]
+    for i in range(m):
+        k, lever = state.blocks[p, i], state.levers[p, i]
+        for c in range(3):  # a motion da of the frame end acts as -da of the platform end
+            _fill_wrench(wrenches, 3 * i + c, lever, k[0, c], k[1, c], k[2, c])
+    _multiply(1.0, compliance, wrenches, out.by_frame[p])
+    for i in range(m):
+        force, k, lever = state.forces[p, i], state.blocks[p, i], state.levers[p, i]
+        for c in range(3):  # a change db shifts the end of the cable and its force by Q db
+            x, y, z = rotation[0, c], rotation[1, c], rotation[2, c]
+            _fill_wrench(
+                wrenches, 3 * i + c, lever,
+                k[0, 0] * x + k[0, 1] * y + k[0, 2] * z,
+                k[1, 0] * x + k[1, 1] * y + k[1, 2] * z,
+                k[2, 0] * x + k[2, 1] * y + k[2, 2] * z,
+            )  # fmt: skip
+            wrenches[3, 3 * i + c] += y * force[2] - z * force[1]
+            wrenches[4, 3 * i + c] += z * force[0] - x * force[2]
+            wrenches[5, 3 * i + c] += x * force[1] - y * force[0]
+    _multiply(-1.0, compliance, wrenches, out.by_platform[p])
+
+
+@glue
+def _fill_null(free: Array, by_length: Array, matrix: Array, q: Array, diagonals: Array, null: Array) -> None:
+    """Fill an orthonormal basis (m, m - n) of the length changes that do not move the platform."""
+    n, m = matrix.shape
+    for j in range(n):
+        for i in range(m):
+            total = 0.0
+            for a in range(6):
+                total += free[j, a] * by_length[a, i]
+            matrix[j, i] = total
+    reflect_rows(matrix, diagonals)
+    orthogonal_factor(matrix, diagonals, q)
+    for i in range(m):
+        for c in range(m - n):
+            null[i, c] = q[i, n + c]
+
+
+@entry
+def sensitivities_of_states(
+    model: f.ForwardTerms,
+    robots: tuple[Array, Array, Array],
+    poses: Array,
+    results: Array,
+    memory: tuple[Array, Indices],
+    states: tuple[Array, Array, Array, Array, Array, Array],
+    found: tuple[Array, Array, Array, Array, Array, Array],
+) -> None:
+    """Sensitivities of the pose and of tensions at N equilibria, NaN at a singular stiffness.
+
+    The arguments are the same as in `describe_states`. `found`: arrays of `_Sensitivities`, which are filled.
+    """
+    n, m = robots[0].shape[0], results.shape[2]
+    state, out = _States(*states), _Sensitivities(*found)
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, m)
-    gradient, rest = vector(rest, 6)
-    for p in range(count):
-        if code == codes.STRAIGHT or math.isnan(batch.lengths[p, 0]):
-            matrices[p] = math.nan
-            blocks[p] = math.nan
-            slopes[p] = math.nan
-            levers[p] = math.nan
+    work, rest = block(rest, 2 * n + 1, n)
+    wrenches, rest = block(rest, 6, m)
+    wide, rest = block(rest, 6, 3 * m)
+    diagonals, rest = block(rest, 2, n)
+    matrix, rest = block(rest, n, m)
+    q, rest = block(rest, m + 1, m)
+    for p in range(poses.shape[0]):
+        known = _describe_pose(model, robots, poses, results, p, (rotation, rows), state)
+        if not known or not _fill_compliance(robots[0], state.matrices[p], work, out.compliances[p]):
+            out.compliances[p] = math.nan
+            out.by_data[p] = math.nan
+            out.by_frame[p] = math.nan
+            out.by_platform[p] = math.nan
+            out.tensions[p] = math.nan
+            out.null[p] = math.nan
             continue
-        body, cables = f.row_of(batch.bodies, p), f.row_of(batch.robots, p)
-        placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
+        for k in range(DATA):
+            for i in range(m):
+                slope = state.slopes[p, k, i]
+                _fill_wrench(wrenches, i, state.levers[p, i], slope[0], slope[1], slope[2])
+            _multiply(-1.0, out.compliances[p], wrenches, out.by_data[p, k])
+        _fill_anchors(p, rotation, state, wide, out)
+        by_length = out.by_data[p, BY_LENGTH]
         for i in range(m):
-            rows[g.LENGTH, i] = batch.lengths[p, i]
-            rows[g.PARAMETER, i] = math.nan  # a result must not depend on the previous sample
-        f.unbalance(placed, cables, body, f.row_of(batch.wrenches, p), batch.starts[p], rotation, rows, gradient)
-        f.platform_stiffness(placed, cables, rows, matrices[p])
-        for i in range(m):
-            _describe_cable(placed, cables, rows, i, blocks[p, i], slopes[p], levers[p, i])
+            own = state.tensions[p, i]
+            for j in range(m):
+                total = own[6] if i == j else 0.0
+                for a in range(6):
+                    total += own[a] * by_length[a, j]
+                out.tensions[p, i, j] = total
+        if m > n:
+            _fill_null(robots[0], by_length, matrix, q, diagonals, out.null[p])
+
+
+@entry
+def compliances_of(free: Array, matrices: Array, memory: tuple[Array, Indices], compliances: Array) -> None:
+    """Fill the compliances (N, 6, 6) from the stiffnesses `matrices` (N, 6, 6); NaN if a stiffness is singular."""
+    work, _rest = block(Memory(*memory), 2 * free.shape[0] + 1, free.shape[0])
+    for p in range(matrices.shape[0]):
+        _fill_compliance(free, matrices[p], work, compliances[p])
+
+
+@entry
+def least_stiffnesses(free: Array, matrices: Array, memory: tuple[Array, Indices], least: Array) -> None:
+    """Fill the stiffnesses (N,) against a force on the center of mass in the softest direction [N/m]; 0 if unstable.
+
+    `matrices`: stiffnesses of the platform, (N, 6, 6), or NaN.
+    """
+    n = free.shape[0]
+    work, rest = block(Memory(*memory), 2 * n + 1, n)
+    compliance, rest = block(rest, 6, 6)
+    soft, rest = block(rest, 3, 3)
+    vectors, rest = block(rest, 3, 6)
+    for p in range(matrices.shape[0]):
+        matrix, scale = work[:n], work[2 * n]
+        symmetric_part(free, matrices[p], matrix)
+        for j in range(n):  # makes forces and moments comparable
+            scale[j] = 1.0 / math.sqrt(abs(matrix[j, j])) if abs(matrix[j, j]) > 0.0 else 1.0
+        lost = False
+        for j in range(n):
+            for k in range(n):
+                lost = lost or math.isnan(matrix[j, k])
+                matrix[j, k] *= scale[j] * scale[k]
+        least[p] = math.nan if lost else 0.0
+        low = 0.0
+        if not lost:
+            low = extreme_eigenvalues(matrix, vectors[0, :n], vectors[1, :n], vectors[2, :n], math.inf)[0]
+        if low > 0.0 and _fill_compliance(free, matrices[p], work, compliance):
+            for j in range(3):
+                for k in range(3):
+                    soft[j, k] = 0.5 * (compliance[j, k] + compliance[k, j])
+            least[p] = 1.0 / extreme_eigenvalues(soft, vectors[0, :3], vectors[1, :3], vectors[2, :3], math.inf)[1]
+
+
+@glue
+def _fill_state(
+    model: Model, cables: Array, body: Array, pose: Array, results: Array, p: int, rotation: Array, rows: Array
+) -> None:
+    """Fill geometry, lengths and forces of the cables at a solved pose `p`."""
+    cable_geometry(cables, body, pose, rotation, rows)
+    if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        copy(results[tables.LENGTH, p], rows[g.LENGTH])
+        rows[g.PARAMETER] = math.nan  # a result must not depend on the previous sample
+        forces_from_lengths(model, cables, rows, model.behind)
+    else:
+        _fill_rows(model, cables, results, p, rows)
 
 
 @glue
@@ -156,13 +456,7 @@ def stabilities_of_poses(
             continue
         body, cables = f.row_of(bodies, p), f.row_of(tables_of_cables, p)
         model = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
-        cable_geometry(cables, body, poses[p], rotation, rows)
-        if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-            copy(results[tables.LENGTH, p], rows[g.LENGTH])
-            rows[g.PARAMETER] = math.nan
-            forces_from_lengths(model, cables, rows, behind)
-        else:
-            _fill_rows(model, cables, results, p, rows)
+        _fill_state(model, cables, body, poses[p], results, p, rotation, rows)
         f.platform_stiffness(model, cables, rows, stiffness)
         f.fill_arcs(freedom, cables, body, arcs)
         symmetric_part(arcs, stiffness, matrix)
