@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
+import sagline.jax
+from sagline.core.arrays import Array
 from sagline.share.machine import courses_at
+from sagline.statics.slopes import KernelStates
+from sagline.statics.stiffness import compliance_of, least_stiffness
+from sagline.tension.method import LIMITS_OF
 from tests.kinematics.test_underconstrained import places, suspended
 from tests.record.poses import METHODS, MODELS
 
@@ -145,6 +150,17 @@ def corner_cases() -> None:
         corner()
 
 
+def lengths_by_inputs(state: sl.Equilibrium) -> Array:
+    """Sensitivities of the lengths of one pose, which only XLA calls in the package, (m, 7 m + 6)."""
+    kernels: Any = vars(sagline.jax)["distribution"]  # as the recorder sees it
+    m, limits = state.cables.shape[-1], LIMITS_OF[state.one_robot.tension_limits_of]
+    found = np.empty((1, m, kernels.LENGTH_COLUMNS * m + 6))
+    (terms, robots, poses, results, memory, states) = next(KernelStates.of(state).parts())
+    goals = np.zeros((1, m))
+    kernels.sensitivities_of_lengths(terms, (limits, np.nan), robots, poses, results, goals, memory, states, found)
+    return found
+
+
 def statics(robot: sl.Robot, count: int) -> None:
     """Margins, confirmation, equilibria, modes, polygon, distances."""
     poses = poses_of(robot, count, 2)
@@ -156,7 +172,10 @@ def statics(robot: sl.Robot, count: int) -> None:
     if robot.cable_count - robot.degrees_of_freedom == 2:
         sl.tension_polygon(robot, state.pose)
     sl.modes(state)
-    sl.stiffness(state)
+    matrix = sl.stiffness(state).matrix[None]
+    compliance_of(robot.freedom, matrix)
+    least_stiffness(robot.freedom, matrix)
+    lengths_by_inputs(state)
     sl.clearance(state)
     sl.equilibria(robot, state.unstrained_length, starts=10)
     if robot.winches is None:

@@ -63,8 +63,8 @@ def library_text(digest: str) -> str:
         assert len(slots) <= MOST_SLOTS
         form = "".join(_format(type_) for type_ in types).replace("?", r"\?")  # "??(" is a trigraph of C
         rows.append(f'    {{"{function.__name__}", "({form})", call_{symbol}, {len(slots)}, \'{kind}\'}},')
-    host = (Path(__file__).parent / "python.c").read_text(encoding="utf-8")
-    return "\n".join((program.text(), EXPORTED, host, *calls, TABLE % (digest, "\n".join(rows))))
+    python, xla = ((Path(__file__).parent / name).read_text(encoding="utf-8") for name in ("python.c", "xla.c"))
+    return "\n".join((program.text(), EXPORTED, python, *calls, TABLE % (digest, "\n".join(rows)), xla))
 
 
 def _member(kind: str) -> str:

@@ -125,6 +125,10 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
             plain_tuple(CODES1, CODES1),
         ),
     },
+    "sensitivities_of_lengths": {
+        "": (FORWARD, LIMITS, ROBOTS, F2, F3, F2, MEMORY, STATES, F3),
+        "pulleys": (FORWARD_PULLEYS, LIMITS, ROBOTS, F2, F3, F2, MEMORY, STATES, F3),
+    },
     "sensitivities_of_states": {
         "": (FORWARD, ROBOTS, F2, F3, MEMORY, STATES, SENSITIVITIES),
         "pulleys": (FORWARD_PULLEYS, ROBOTS, F2, F3, MEMORY, STATES, SENSITIVITIES),

@@ -22,7 +22,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot, standard_errors
 from sagline.robot.routing import kernel_length
 from sagline.robot.winch import Winch
-from sagline.statics.slopes import cable_slopes, tension_slopes
+from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of
 from sagline.statics.tables import pose_rows
 
@@ -100,7 +100,7 @@ def _add_moments(state: Equilibrium, slopes: Array) -> None:
     matrix = cables.matrix.reshape(-1, 6, 6)
     skew = 0.5 * (matrix - np.swapaxes(matrix, 1, 2))
     change = -compliance_of(robot.freedom, matrix) @ skew @ slopes[:, m:]  # motion of the center of mass
-    slopes[:, :m] += tension_slopes(state, cables)[0].reshape(-1, m, 6) @ change
+    slopes[:, :m] += cables.tension_by_motion.reshape(-1, m, 6) @ change
     reach = (state.pose.matrix @ robot.center_of_mass).reshape(-1, 3)
     slopes[:, m : m + 3] += change[:, :3] - np.cross(change[:, 3:], reach[:, :, None], axis=1)
     slopes[:, m + 3 :] += change[:, 3:]

@@ -44,7 +44,7 @@ def backend() -> str:
     reason, step = "", INSTALL
     if chosen in ("", "c"):
         try:
-            _library()
+            compiled_library()
         except LibraryError as error:
             reason, step = f"{error}; ", "Run `make env` in the clone." if error.stale else INSTALL
             if chosen:
@@ -68,14 +68,15 @@ def backend() -> str:
 
 
 @cache
-def _library() -> Library:
+def compiled_library() -> Library:
+    """The library of compiled kernels."""
     return Library.load()
 
 
 def entry(function: F) -> F:
     """A kernel that Python calls, and that runs without Python's global lock."""
     if backend() == "c":
-        found = _library().entry(function.__name__, function.__module__)
+        found = compiled_library().entry(function.__name__, function.__module__)
         if found is not None:
             return cast("F", update_wrapper(found, function))
         from sagline.kernels.plain import plain
@@ -87,7 +88,7 @@ def entry(function: F) -> F:
 
 def loaded_entry(name: str, module: str) -> object:
     """The entry `name` of `module`. The module is not imported if the library has the entry."""
-    found = _library().entry(name, module) if backend() == "c" else None
+    found = compiled_library().entry(name, module) if backend() == "c" else None
     return getattr(import_module(module), name) if found is None else found
 
 

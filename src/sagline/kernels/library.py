@@ -166,6 +166,11 @@ class Library:
                 return cls(newer)
         return library
 
+    @property
+    def xla(self) -> Any:
+        """Function of the library that calls an entry for XLA, the compiler of JAX."""
+        return self._library.sagline_xla
+
     def entry(self, name: str, module: str) -> Entry | None:
         """The compiled version of the kernel `name` of `module`. None if the library has no such version."""
         if name not in self._rows or not module.startswith("sagline.kernels."):

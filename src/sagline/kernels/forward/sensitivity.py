@@ -98,7 +98,7 @@ def _at_frame_end(model: Model, cables: Array, rows: Array, i: int) -> tuple[flo
     )
 
 
-class _States(NamedTuple):
+class States(NamedTuple):
     """Output arrays of the first derivatives at N equilibria."""
 
     matrices: Array  # stiffness of the platform, (N, 6, 6)
@@ -126,14 +126,14 @@ def _fill_tension_slopes(
 
 
 @glue
-def _describe_pose(
+def describe_pose(
     terms: f.ForwardTerms,
     robots: tuple[Array, Array, Array],
     poses: Array,
     results: Array,
     p: int,
     work: tuple[Array, Array],
-    out: _States,
+    out: States,
 ) -> bool:
     """Fill the outputs of pose `p`. False, and NaN, for straight cables and for a pose without lengths."""
     code, k_h, k_p, behind = terms
@@ -173,12 +173,12 @@ def describe_states(
 ) -> None:
     """Stiffness and derivatives of cable forces at N equilibria, NaN for straight cables and for lengths that are NaN.
 
-    The arguments are the same as in `stabilities_of_poses`. `found`: arrays of `_States`, which are filled.
+    The arguments are the same as in `stabilities_of_poses`. `found`: arrays of `States`, which are filled.
     """
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, results.shape[2])
     for p in range(poses.shape[0]):
-        _describe_pose(model, robots, poses, results, p, (rotation, rows), _States(*found))
+        describe_pose(model, robots, poses, results, p, (rotation, rows), States(*found))
 
 
 SINGULAR = 1e-14  # smallest determinant of a regular matrix that is scaled to diagonal elements of 1
@@ -196,6 +196,26 @@ class _Sensitivities(NamedTuple):
 
 
 @kernel
+def invert_scaled(matrix: Array, inverse: Array, scale: Array) -> bool:
+    """Fill the `inverse` (n, n) of a matrix that is scaled to diagonal elements of 1. False if it is singular.
+
+    Destroys `matrix`; `scale`: work array (n,). Forces and moments get similar magnitudes.
+    """
+    n = matrix.shape[0]
+    for j in range(n):
+        scale[j] = 1.0 / math.sqrt(abs(matrix[j, j])) if abs(matrix[j, j]) > 0.0 else 1.0
+    for j in range(n):
+        for k in range(n):
+            matrix[j, k] *= scale[j] * scale[k]
+    if not abs(invert_general(matrix, inverse)) >= SINGULAR:
+        return False
+    for j in range(n):
+        for k in range(n):
+            inverse[j, k] *= scale[j] * scale[k]
+    return True
+
+
+@kernel
 def _fill_compliance(free: Array, stiffness: Array, work: Array, compliance: Array) -> bool:
     """Fill the `compliance` (6, 6): inverse of the stiffness for the free motions. False, and NaN, if it is singular.
 
@@ -204,17 +224,9 @@ def _fill_compliance(free: Array, stiffness: Array, work: Array, compliance: Arr
     n = free.shape[0]
     matrix, inverse, scale = work[:n], work[n : 2 * n], work[2 * n]
     matrix_along(free, stiffness, matrix)
-    for j in range(n):  # forces and moments get similar magnitudes
-        scale[j] = 1.0 / math.sqrt(abs(matrix[j, j])) if abs(matrix[j, j]) > 0.0 else 1.0
-    for j in range(n):
-        for k in range(n):
-            matrix[j, k] *= scale[j] * scale[k]
-    if not abs(invert_general(matrix, inverse)) >= SINGULAR:
+    if not invert_scaled(matrix, inverse, scale):
         compliance[:] = math.nan
         return False
-    for j in range(n):
-        for k in range(n):
-            inverse[j, k] *= scale[j] * scale[k]
     for a in range(6):
         for b in range(6):
             total = 0.0
@@ -253,7 +265,7 @@ def _fill_wrench(wrenches: Array, j: int, lever: Array, x: float, y: float, z: f
 
 
 @glue
-def _fill_anchors(p: int, rotation: Array, state: _States, wrenches: Array, out: _Sensitivities) -> None:
+def _fill_anchors(p: int, rotation: Array, state: States, wrenches: Array, out: _Sensitivities) -> None:
     """Fill the sensitivities to frame anchors and to platform anchors. `wrenches`: (6, 3 m)."""
     compliance = out.compliances[p]
     m = state.levers.shape[1]
@@ -310,7 +322,7 @@ def sensitivities_of_states(
     The arguments are the same as in `describe_states`. `found`: arrays of `_Sensitivities`, which are filled.
     """
     n, m = robots[0].shape[0], results.shape[2]
-    state, out = _States(*states), _Sensitivities(*found)
+    state, out = States(*states), _Sensitivities(*found)
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, m)
     work, rest = block(rest, 2 * n + 1, n)
@@ -320,7 +332,7 @@ def sensitivities_of_states(
     matrix, rest = block(rest, n, m)
     q, rest = block(rest, m + 1, m)
     for p in range(poses.shape[0]):
-        known = _describe_pose(model, robots, poses, results, p, (rotation, rows), state)
+        known = describe_pose(model, robots, poses, results, p, (rotation, rows), state)
         if not known or not _fill_compliance(robots[0], state.matrices[p], work, out.compliances[p]):
             out.compliances[p] = math.nan
             out.by_data[p] = math.nan
