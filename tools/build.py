@@ -19,24 +19,13 @@ from pathlib import Path
 from typing import Final
 
 ROOT: Final = Path(__file__).parents[1]
-FLAGS: Final = (
-    "-std=c99", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-fvisibility=hidden", "-shared",
-)  # fmt: skip
 # flags of the two files; gcc 12 contracts one expression in spite of -ffp-contract=off
 LEVELS: Final = (("-O2",), ("-O3", "-march=x86-64-v3", "-mno-fma"))
-ZIG: Final = [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline", "-s"]
 ZIG_LEVELS: Final = (("-O3",),)  # only the file for every processor: zig cannot detect the kind of processor
 
 
 class BuildError(Exception):
     """The kernels cannot be built; the text gives the reason."""
-
-
-def compilers() -> list[list[str]]:
-    """Commands of the C compilers that can be used, the preferred one first."""
-    named = [shlex.split(os.environ["CC"])] if os.environ.get("CC") else []
-    found = [[path] for name in ("cc", "gcc", "clang") if (path := shutil.which(name))]
-    return named + found[:1] + ([ZIG] if find_spec("ziglang") else [])
 
 
 def build() -> None:
@@ -46,6 +35,7 @@ def build() -> None:
         BuildError: If no compiler is found, or none compiles.
     """
     os.environ["SAGLINE_BACKEND"] = "python"  # the translator reads the sources
+    from sagline.files.compilers import compilers
     from sagline.kernels.library import FILES, FOLDER
     from sagline.kernels.sources import digest, digest_of_kernels
     from tools.translate import portable, wasm
@@ -81,17 +71,18 @@ def is_x86() -> bool:
 
 def _compile(source: Path, files: list[Path]) -> None:
     """Compile the files at the same time, with the first compiler that can compile them."""
+    from sagline.files.compilers import ZIG, compilers, library_command
+
     reasons = []
     for command in compilers():
         start = time.monotonic()
         print(f"building the kernels with {shlex.join(command)} (about a minute) ...", flush=True)
         levels = ZIG_LEVELS if command is ZIG else LEVELS if len(files) > 1 else (("-O3",),)
         made = {source.with_suffix(f".{k}{file.suffix}"): file for k, file in enumerate(files[: len(levels)])}
-        around = ((), ()) if sys.platform == "win32" else (("-fPIC",), ("-lm",))
         try:
             calls = [
                 subprocess.Popen(
-                    [*command, *FLAGS, *around[0], *level, str(source), "-o", str(out), *around[1]],
+                    library_command(command, source, out, *level),
                     stdout=subprocess.PIPE,
                     stderr=subprocess.STDOUT,
                     text=True,

@@ -7,6 +7,7 @@ from . import control as control
 from . import core as core
 from . import dynamics as dynamics
 from . import files as files
+from . import fmu as fmu
 from . import interference as interference
 from . import kinematics as kinematics
 from . import motion as motion
@@ -44,6 +45,7 @@ from .files import load_log as load_log
 from .files import load_path as load_path
 from .files import load_plan as load_plan
 from .files import load_robot as load_robot
+from .fmu import *
 from .interference import *
 from .kinematics import *
 from .kinematics import Confirmation as Confirmation

@@ -880,6 +880,20 @@ def _files(given: _Given) -> dict[str, Call]:
             sl.export_scl,
             _all(robot=("one", sl.load_robot("article-prototype")), file=("file", str(folder / "plc.scl"))),
         ),
+        "export_fmu": Call(
+            sl.export_fmu,
+            _all(
+                robot=("one", given.robot),
+                file=("file", str(folder / "robot.fmu")),
+                start=("place", sl.inverse(given.robot, given.pose).state, True),
+                inputs=("word", "lengths"),
+                fmi=("whole", 2),
+                winches=("one", sl.SecondOrder(10.0)),
+                integrator=("word", "splitting", True),
+                step=("number", 5e-4, True),
+                damping=("one", sl.Damping(), True),
+            ),
+        ),
         "dump_mjcf": Call(
             sl.dump_mjcf,
             _all(robot=("one", given.robot), pose=("one", given.pose), unstrained_length=("array", given.length, True)),

@@ -32,6 +32,7 @@ COMMANDS = {
     "mjcf": ("convert", ROBOT, "--format", "mjcf", "--out", "out/robot.xml"),
     "export-c": ("export-c", ROBOT, "--out", "out/sagline.c"),
     "export-scl": ("export-scl", "article-prototype", "--out", "out/plc.scl"),
+    "export-fmu": ("export-fmu", ROBOT, "--out", "out/robot.fmu"),
     "new": ("new", "out/mine.yaml", "--force"),
 }
 

@@ -24,6 +24,7 @@ TOLD = (
     "cables",
     "errors",
     "files",
+    "fmu",
     "kinematics",
     "motion",
     "plot",

@@ -60,6 +60,7 @@ COMMANDS: Final = (
     "convert cogiro --format mjcf --out cogiro.xml",
     "export-c cogiro --out c.c",
     "export-scl article-prototype --out prototype.scl",
+    "export-fmu cogiro --out cogiro.fmu",
     "track winches_robot.yaml own_path.yaml --no-figures --json --out wound",
     "encoder wound/hall-winches-catenary.nc --out counts.csv",
     "run --json --out the_run",

@@ -1,4 +1,4 @@
-"""C of the entries that `sagline export-c` writes, as data of the package: `python -m tools.translate.portable`.
+"""C of the entries that exported sources contain, as data of the package: `python -m tools.translate.portable`.
 
 Each struct, table and function is a part with the names that it defines. `sagline.files.c_source` copies the parts that
 a robot needs. Sizes and indices have 32 bits, and the data of the robot and of the pose are constant.
@@ -91,12 +91,19 @@ ENTRIES: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (
     ("forward_poses", "forward_bare", (s.FORWARD, *FORWARD)),
     ("forward_poses", "forward_over_pulleys", (s.FORWARD_PULLEYS, *FORWARD)),
 )
+RUN: Final = (*s.RUN[:2], plain_tuple(K2, K1, K1, K2), K2, *s.RUN[4:], s.INT, s.INT)
+SIMULATION: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (  # of `sagline.fmu`, in double precision only
+    ("begin_period", "begin_period", s.SIGNATURES["begin_period"][""]),
+    ("run_massless", "run_bare", (plain_tuple(*s.DYNAMIC_MODEL, NONE), *RUN)),
+    ("run_massless", "run_over_pulleys", (plain_tuple(*s.DYNAMIC_MODEL, s.BOOL), *RUN)),
+    ("platform_state", "platform_state", s.SIGNATURES["platform_state"][""]),
+)
 
 
-def parts() -> Iterator[tuple[list[str], str]]:
+def parts(entries: tuple[tuple[str, str, tuple[Type, ...]], ...]) -> Iterator[tuple[list[str], str]]:
     """Names and text of each part, in the order of C; the common beginning of all sources has no names."""
     program = Program()
-    for entry, symbol, types in ENTRIES:
+    for entry, symbol, types in entries:
         program.export(s.functions()[entry], types, symbol)
     yield [], HEAD.removesuffix(HELPERS).partition("*/\n\n")[2]
     for paragraph in HELPERS.strip().split("\n\n"):
@@ -197,9 +204,9 @@ def _record(*items: Value) -> Record:
 def build(root: Path) -> None:
     """Write the data of the package below a source tree."""
     with constants(OMITTED):
-        double = list(parts())
+        double = list(parts((*ENTRIES, *SIMULATION)))
     with constants({**SINGLE, **OMITTED}):
-        single = [(names, in_single(text)) for names, text in parts()]
+        single = [(names, in_single(text)) for names, text in parts(ENTRIES)]
     found: dict[str, Any] = {
         name: [(names, text.replace("int64_t", "int32_t")) for names, text in part]
         for name, part in (("double", double), ("float", single))

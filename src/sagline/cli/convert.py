@@ -1,10 +1,11 @@
-"""`sagline convert`, `export-c` and `export-scl`: files for other tools, microcontrollers and PLCs."""
+"""`sagline convert`, `export-c`, `export-scl` and `export-fmu`: files for other tools, controllers and simulations."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,20 @@ class _Format(StrEnum):
 
     ROBOT = "robot"
     MJCF = "mjcf"
+
+
+class _Inputs(StrEnum):
+    """Inputs of the winches in a unit of co-simulation."""
+
+    SPEEDS = "speeds"
+    LENGTHS = "lengths"
+
+
+class _Fmi(StrEnum):
+    """Versions of the Functional Mock-up Interface."""
+
+    FMI2 = "2"
+    FMI3 = "3"
 
 
 LEAST = 1e-6  # smallest position error that is printed [m]
@@ -193,3 +208,32 @@ def export_scl(robot: str = opt.ROBOT, out: Path = opt.out(Path("plc.scl"))) -> 
     path = sl.export_scl(loaded, target)
     groups = len(groups_of(loaded.cable_count))
     show_text(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)
+
+
+def export_fmu(
+    robot: str = opt.ROBOT,
+    out: Path = opt.out(Path("sagline.fmu")),
+    pose: Any = opt.POSE,
+    inputs: _Inputs = opt.choice(_Inputs.SPEEDS, "INPUTS", "Inputs of the winches", _Inputs),
+    fmi: _Fmi = opt.choice(_Fmi.FMI3, "VERSION", "Version of the interface", _Fmi),
+    winches: opt.WinchModel = opt.WINCHES,
+    step: float | None = opt.STEP,
+) -> None:
+    """Write a robot with winches and a platform as a unit of co-simulation (FMU), for Simulink, Dymola and others.
+
+    The unit computes the motion as `sagline simulate` does: inputs are winch speeds or lengths and a wrench on the
+    platform, outputs are pose, twist, tensions and lengths. It contains the compiled library and its C source.
+
+    For example:
+
+        sagline export-fmu cogiro --out cogiro.fmu
+        sagline export-fmu own_robot.yaml --fmi 2 --inputs lengths --pose 0,0,1.5
+    """
+    loaded = sl.load_robot(robot)
+    target = file_of(out, "sagline.fmu")
+    kinds: Any = (inputs.value, winches.value)
+    create_folder(target.parent)
+    path = sl.export_fmu(loaded, target, start=pose, inputs=kinds[0], fmi=int(fmi), winches=kinds[1], step=step)
+    show_text(
+        f"{path}: {loaded.name} for FMI {fmi.value}, with {inputs.value} of {loaded.cable_count} winches", whole=True
+    )

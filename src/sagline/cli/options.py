@@ -40,6 +40,13 @@ class TensionVariable(StrEnum):
     FRAME_END = "frame_end"
 
 
+class WinchModel(StrEnum):
+    """Models of winches."""
+
+    IDEAL = "ideal"
+    ROBOT = "robot"
+
+
 class FigureStyle(StrEnum):
     """Styles of figures, by journal and width."""
 
@@ -249,6 +256,10 @@ GIVEN: Any = converted(
     "Given values of a platform with fewer cables than degrees of freedom: 'x,y,z,yaw' or 'x,y,z,level'. "
     "Default: x, y, z and, with four cables, the tension level.",
     lambda text, item: tuple(name.strip() for name in text.split(",")),
+)
+WINCHES = choice(WinchModel.IDEAL, "WINCHES", "Model of the winches", WinchModel)
+STEP: float | None = quantity(
+    None, "TIME", "Time step of the integrator [s]. Default: a step that suits the robot.", "s", above=0.0
 )
 LOSS_TIME: float | None = quantity(
     None, "TIME", "Loss time [s] of the cable material: axial stiffness EA (1 + i omega TIME).", "s", low=0.0

@@ -38,13 +38,6 @@ class _CableMass(StrEnum):
     MODAL = "modal"
 
 
-class _Winches(StrEnum):
-    """Models of winches."""
-
-    IDEAL = "ideal"
-    ROBOT = "robot"
-
-
 BREAK = re.compile(r"([0-9]{1,3})@([^@]+)(?:@([^@]+))?")
 EVENT = ("time_s", "kind", "cable", "tension_before_n", "tension_after_n", "limit")
 STEP = "Give the cable and the time of the break: --break 3@2.5s."
@@ -69,12 +62,10 @@ def simulate(
         _ShaperKind.NONE, "SHAPER", "Input shaper of the path", _ShaperKind, opt.only_with("PATH")
     ),
     cable_mass: _CableMass = opt.choice(_CableMass.NONE, "KIND", "Model of the cable mass", _CableMass),
-    winches: _Winches = opt.choice(_Winches.IDEAL, "WINCHES", "Model of the winches", _Winches),
+    winches: opt.WinchModel = opt.WINCHES,
     breaks: list[str] | None = _BREAKS,
     after: float = opt.quantity(3, "TIME", "Simulated time after the end of the path [s].", "s", low=0.0),
-    step: float | None = opt.quantity(
-        None, "TIME", "Time step of the integrator [s]. Default: a step that suits the robot.", "s", above=0.0
-    ),
+    step: float | None = opt.STEP,
     tension: str = opt.TENSION,
     loss_time: float | None = opt.LOSS_TIME,
     air_damping: float = opt.AIR_DAMPING,

@@ -88,7 +88,7 @@ def export_c(
     if not methods:
         raise InvalidValueError("tension", "empty", "a method or several", "Give a method, for example Closest().")
     chosen = [method_of(method) for method in methods]
-    path = _checked_name(file_path(file), ".c", "C source", "sagline")
+    path = checked_name(file_path(file), ".c", "C source", "sagline")
     source, header = _source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
     texts = {path: source, path.with_suffix(".h"): header, path.with_suffix(".scl"): filled("c/sagline.scl", {})}
     with atomic_files(path.parent, [place.name for place in texts]) as partials:
@@ -103,7 +103,7 @@ def _source_of(
 ) -> tuple[str, str]:
     """Compose the C99 source and header of a robot, with numbers of type float64 or float32."""
     options = [kernel_options(robot, Catenary(), method) for method in methods]
-    kernels = _kernels()
+    kernels = translated_kernels()
     words = _words(robot, methods, options, real, stem)
     asked = ["inverse_nearest" if all(map(takes_default_kernel, methods)) else "inverse_by_method"]
     if forward:
@@ -122,10 +122,12 @@ def _source_of(
     words["forward"] = filled("c/forward.h", words) if forward else ""
     functions = ["c/inverse.c", *(["c/forward.c"] if forward else [])]
     body = "".join(filled(name, words) for name in functions)
-    return f"{filled('c/head.c', words)}{_reached(kernels[words['real']], asked)}\n{body}", filled("c/sagline.h", words)
+    return f"{filled('c/head.c', words)}{reached_parts(kernels[words['real']], asked)}\n{body}", filled(
+        "c/sagline.h", words
+    )
 
 
-def _kernels() -> dict[str, Any]:
+def translated_kernels() -> dict[str, Any]:
     """Read the translated kernels in both precisions, and their bounds."""
     place = files("sagline.files").joinpath(KERNELS)
     try:
@@ -142,7 +144,7 @@ def _evaluated(bounds: dict[str, list[tuple[int, int, int]]], robot: Robot) -> d
     return {name: sum(value * n**i * r**j for i, j, value in terms) for name, terms in bounds.items()}
 
 
-def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
+def reached_parts(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
     """Select the parts that the entries `asked` need, in the order of the source."""
     owner = {name: index for index, (names, _) in enumerate(parts) for name in names}
     waiting, reached = [owner[name] for name in asked], {index for index, (names, _) in enumerate(parts) if not names}
@@ -172,7 +174,7 @@ def _words(
     }
     return {
         **origin(robot),
-        **{name: _constant(np.asarray(value), name, real) for name, value in data.items()},
+        **{name: constant_text(np.asarray(value), name, real) for name, value in data.items()},
         "header": f"{stem}.h",
         "real": "float" if real is np.float32 else "double",
         "cables": str(m),
@@ -203,8 +205,8 @@ def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
 def _rule(options: Options, real: type[np.floating]) -> str:
     """Data of a tension distribution method as C text."""
     code, parameter, variable, weights, targets = options.sharing
-    numbers = (_constant(np.asarray(value), "tension", real) for value in (parameter, options.limits[1]))
-    lists = (_constant(np.asarray(value), "tension", real) for value in (weights, targets))
+    numbers = (constant_text(np.asarray(value), "tension", real) for value in (parameter, options.limits[1]))
+    lists = (constant_text(np.asarray(value), "tension", real) for value in (weights, targets))
     return f"{{{code}, {', '.join(numbers)}, {variable}, {', '.join(lists)}}}"
 
 
@@ -217,11 +219,11 @@ def _statuses() -> str:
     return "\n".join(f"    SAGLINE_{name} = {code}, /* {text} */" for name, code, text in rows)
 
 
-def _constant(values: Array, name: str, real: type[np.floating]) -> str:
+def constant_text(values: Array, name: str, real: type[np.floating]) -> str:
     """C text of a constant, or of a list in braces. C reads exactly the same numbers from this text."""
     if values.ndim:
         separator = ", " if values.ndim == 1 else ",\n    "
-        return f"{{{separator.join(_constant(value, name, real).strip('{}') for value in values)}}}"
+        return f"{{{separator.join(constant_text(value, name, real).strip('{}') for value in values)}}}"
     with np.errstate(over="ignore", under="ignore"):
         number = real(values)
     if np.isnan(values) or np.isinf(values):
@@ -256,7 +258,7 @@ def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
         >>> path = sl.export_scl(sl.load_robot("article-prototype"), "plc.scl")
     """
     instance(robot, Robot, "robot")
-    path = _checked_name(file, ".scl", "an SCL source", "plc")
+    path = checked_name(file, ".scl", "an SCL source", "plc")
     text = _source_text(robot)
     with atomic_files(path.parent, [path.name]) as partials:
         partials[0].write_text(text, encoding="utf-8", newline="\r\n")
@@ -334,7 +336,7 @@ def _scl_number(value: float) -> str:
     return text if "." in text else text.replace("E", ".0E")
 
 
-def _checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
+def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
     """Check the path `file` of a source file; raise FileError if its suffix is not `ending`."""
     path = file_path(file)
     if path.suffix != ending:

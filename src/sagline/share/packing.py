@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from math import isfinite
 from typing import Any, Final, Literal, NamedTuple
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError
+from sagline.files.c_calls import AnyArray, leaves, owner
 from sagline.files.packed import smallest_differences
 
 Call = tuple[str, tuple[Any, ...]]  # name of the C entry without prefix, and arguments as in Python
-AnyArray = NDArray[Any]
-
 MODULE: Final = files("sagline.share").joinpath("page").joinpath("kernels.wasm")
 _ALIGNED: Final = 16  # bytes
 
@@ -45,18 +44,18 @@ def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) ->
     places: dict[int, int] = {}  # addresses of the arrays that own memory, by identity
     filled: dict[int, str] = {}
     size = 0
-    leaves = {name: list(_leaves(arguments)) for name, (_, arguments) in calls.items()}
-    for array in [each for row in leaves.values() for each in row if isinstance(each, np.ndarray)]:
-        owner = _owner(array)
-        if id(owner) not in places:
-            places[id(owner)] = size
-            size += -(-owner.nbytes // _ALIGNED) * _ALIGNED
+    rows = {name: list(leaves(arguments)) for name, (_, arguments) in calls.items()}
+    for array in [each for row in rows.values() for each in row if isinstance(each, np.ndarray)]:
+        whole = owner(array)
+        if id(whole) not in places:
+            places[id(whole)] = size
+            size += -(-whole.nbytes // _ALIGNED) * _ALIGNED
         if not array.flags.writeable:
-            filled[places[id(owner)]] = b64encode(owner.tobytes("A")).decode("ascii")
+            filled[places[id(whole)]] = b64encode(whole.tobytes("A")).decode("ascii")
 
     def place(array: AnyArray) -> int:
-        owner = _owner(array)
-        return places[id(owner)] + array.ctypes.data - owner.ctypes.data
+        whole = owner(array)
+        return places[id(whole)] + array.ctypes.data - whole.ctypes.data
 
     def flat(value: Any) -> list[Any]:
         if isinstance(value, np.ndarray):
@@ -69,26 +68,8 @@ def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) ->
         "size": size,
         "filled": list(filled.items()),
         "arrays": {name: (array.dtype.name, place(array), array.size) for name, array in names.items()},
-        "calls": {
-            name: (calls[name][0], [part for leaf in row for part in flat(leaf)]) for name, row in leaves.items()
-        },
+        "calls": {name: (calls[name][0], [part for leaf in row for part in flat(leaf)]) for name, row in rows.items()},
     }
-
-
-def _leaves(value: Any) -> Iterator[Any]:
-    """Arrays and numbers of nested tuples, in order. None is omitted, because None is not an argument in C."""
-    if isinstance(value, tuple):
-        for each in value:
-            yield from _leaves(each)
-    elif value is not None:
-        yield value
-
-
-def _owner(array: AnyArray) -> AnyArray:
-    """The array that owns the memory of a view."""
-    while isinstance(array.base, np.ndarray):
-        array = array.base
-    return array
 
 
 Codes = NDArray[np.int64]

@@ -61,6 +61,14 @@ class Reading(NamedTuple):
     saturated: Array
 
 
+class KernelArguments(NamedTuple):
+    """Arguments of the three kernels of a period, in the order of their calls."""
+
+    begin_period: tuple[Any, ...]
+    run_massless: tuple[Any, ...]
+    platform_state: tuple[Any, ...]
+
+
 class Simulator:
     """Simulated machine for the test of a controller: winches, cables without mass, platform and sensors.
 
@@ -115,27 +123,30 @@ class Simulator:
         )
         code, kind, remembered, loads, stride = rules
         self._plant, self._kind, m = plant, kind, given.robot.cable_count
-        self._set_up_course(given, m)
+        period = self._set_up_course(given, m)
         lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
         rules = (code, kind, remembered, loads | LOADED, stride)
         numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
         inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)))
-        self._records = Records(0, m).arrays
-        arguments = plant.arguments(rules, numbers, inputs)
-        self._run = bound(motion.run_massless, *arguments, self._records, 0, 0, numbers=2)
+        records = (*Records(0, m).arrays[:-1], np.empty((0, k.NOTE_COLUMNS)))
+        run = (*plant.arguments(rules, numbers, inputs), records, 0, 0)
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
         places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
         self._encoders = Encoders(given.robot, *places) if Encoders.are_on(given.robot) else None
         frame = (locked(given.robot.center_of_mass @ plant.axes), plant.turn_back)
         self._platform = np.empty(body.STATE_COLUMNS)
-        self._look = bound(body.platform_state, plant.state, locked(plant.inertia.view()), *frame, self._platform)
+        look = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
+        self.kernel_arguments: KernelArguments = KernelArguments(period, run, look)
+        self._begin = bound(begin_period, *period, numbers=3)
+        self._run = bound(motion.run_massless, *run, numbers=2)
+        self._look = bound(body.platform_state, *look)
         self._reading = self._new_reading()
         self._run(0, 0)
         self._read()
 
-    def _set_up_course(self, given: InitialConditions, m: int) -> None:
-        """Create the time table that connects the last set points to the next set points."""
+    def _set_up_course(self, given: InitialConditions, m: int) -> tuple[Any, ...]:
+        """Create the time table from the last to the next set points. Returns the arguments of `begin_period`."""
         drums = self._kind == d.DRUMS
         stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
         lengths = np.repeat(given.lengths.value, 2, axis=0)
@@ -154,11 +165,9 @@ class Simulator:
         writable = (table.time, table.value, table.begin, table.end)
         read_only = tuple(locked(array.view()) for array in self._given)
         least = locked(dead_cable(given.robot) + np.zeros(m))
-        period = (
-            read_only, least, locked(stretch), lengths, writable, self._wrench_table.value[0], counters
-        )  # fmt: skip
-        self._begin = bound(begin_period, *period, False, False, 1.0, numbers=3)
         self._counters = counters.data
+        load = self._wrench_table.value[0]
+        return read_only, least, locked(stretch), lengths, writable, load, counters, False, False, 1.0
 
     @property
     def time(self) -> float:

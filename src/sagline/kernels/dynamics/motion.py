@@ -201,6 +201,8 @@ def run_massless(
             progress.interval_ends(moving.lengths, at[progress.LENGTH_AT], time + progress.MOMENT * step)
             or at[progress.RENEWED] > 0
         ):
+            if at[progress.RENEWED] > 1:
+                massless.fill_forces(moving, time)  # the wrench jumps at this instant
             at[progress.RENEWED] = 0
             massless.fill_set_points(moving, time, progress.MOMENT * step)  # the rates may jump at this instant
         if kind == d.DRUMS and at[progress.STEPS] % stride == 0:

@@ -71,7 +71,7 @@ def time_tables(courses: Courses) -> tuple[CubicTable, CubicTable, CubicTable]:
     return CubicTable(*courses[0]), CubicTable(*courses[1]), CubicTable(*courses[2])
 
 
-# counters of a run, which each call updates
+# counters of a run, which each call updates; RENEWED: 1 for new set points, 2 if the wrench has changed too
 STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED = range(9)
 COUNTERS = 9
 # columns of the notes: event, time and cable; largest tensions before and after the event; state of the cable or drive
@@ -173,10 +173,12 @@ def begin_period(
             value[1, column] = expected[i]
         begins[0, column] = (value[1, column] - value[0, column]) / whole
         ends[0, column] = begins[0, column]
+    at[LENGTH_AT], at[RENEWED], at[NOTES] = 0, 1, 0
     if with_wrench:
         for k in range(6):
+            if load[k] != wrench[k]:
+                at[RENEWED] = 2
             load[k] = wrench[k]
-    at[LENGTH_AT], at[RENEWED], at[NOTES] = 0, 1, 0
     return True
 
 
