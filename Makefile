@@ -12,7 +12,7 @@ PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
 unexport PYTHONDONTWRITEBYTECODE # else each of a hundred processes compiles anew all that it imports
-.PHONY: help env run article test test-all test-extended coverage check format messages record mutants size bench soak c docs dist pins audit sbom clean
+.PHONY: help env run article test test-all test-extended coverage check format messages record mutants size bench soak c linuxcnc-headers docs dist pins audit sbom clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -90,6 +90,11 @@ soak: env ## the long tests that test-all leaves out, then all others in a rando
 
 c: env ## C99 of all kernels, as OUT/kernels.c
 	$(BIN)/python -m tools.translate $(OUT)/kernels.c
+
+linuxcnc-headers: ## Debian's headers of LinuxCNC (250 kB), for the test of its modules
+	@test -e /usr/include/linuxcnc/kinematics.h -o -e build/linuxcnc/usr/include/linuxcnc/kinematics.h || \
+		{ mkdir -p build/linuxcnc && cd build/linuxcnc && apt-get download -qq linuxcnc-uspace-dev && \
+		for file in *.deb; do dpkg-deb -x "$$file" .; done; }
 
 docs: env ## the documentation site, into build/site; warnings and dead links are errors
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

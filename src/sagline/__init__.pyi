@@ -10,6 +10,7 @@ from . import files as files
 from . import fmu as fmu
 from . import interference as interference
 from . import kinematics as kinematics
+from . import linuxcnc as linuxcnc
 from . import motion as motion
 from . import optimization as optimization
 from . import plc as plc
@@ -55,6 +56,7 @@ from .kinematics import PoseStatus as PoseStatus
 from .kinematics import confirm as confirm
 from .kinematics import forward as forward
 from .kinematics import inverse as inverse
+from .linuxcnc import *
 from .motion import *
 from .motion import Path as Path
 from .motion import quintic_path as quintic_path

@@ -880,6 +880,17 @@ def _files(given: _Given) -> dict[str, Call]:
             sl.export_scl,
             _all(robot=("one", sl.load_robot("article-prototype")), file=("file", str(folder / "plc.scl"))),
         ),
+        "export_linuxcnc": Call(
+            sl.export_linuxcnc,
+            _all(
+                robot=("one", given.robot),
+                folder=("folder", str(folder)),
+                name=("text", "cablekins"),
+                unit=("word", "inch"),
+                tension=("method", sl.Closest()),
+                home=("one", given.pose, True),
+            ),
+        ),
         "export_fmu": Call(
             sl.export_fmu,
             _all(

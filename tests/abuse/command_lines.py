@@ -33,6 +33,7 @@ LINES = {
     "experiment": ["experiment", "article", "--in-process"],
     "export-scl": ["export-scl", "article-prototype"],
     "export-fmu": ["export-fmu", "cogiro"],
+    "export-linuxcnc": ["export-linuxcnc", "cogiro"],
     "twin": ["twin", "article-prototype", "--port", "0"],
     # a port without a server
     "control": ["control", "article-prototype", "--plc", "127.0.0.1:1,127.0.0.1:2,127.0.0.1:3,127.0.0.1:4"],

@@ -33,6 +33,7 @@ COMMANDS = {
     "export-c": ("export-c", ROBOT, "--out", "out/sagline.c"),
     "export-scl": ("export-scl", "article-prototype", "--out", "out/plc.scl"),
     "export-fmu": ("export-fmu", ROBOT, "--out", "out/robot.fmu"),
+    "export-linuxcnc": ("export-linuxcnc", ROBOT, "--out", "out/cablekins.c"),
     "new": ("new", "out/mine.yaml", "--force"),
 }
 

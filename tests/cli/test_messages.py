@@ -270,6 +270,8 @@ FIRST_TIER = """
 2 export-scl cogiro
 2 export-fmu cogiro --out c.zip
 2 export-fmu cogiro --winches robot
+2 export-linuxcnc cogiro --out c.h
+2 export-linuxcnc cogiro --out Kins.c
 2 view nothing-like-it --no-browser
 2 view cogiro missing.nc --no-browser
 2 view cogiro --port 99999 --no-browser

@@ -26,6 +26,7 @@ TOLD = (
     "files",
     "fmu",
     "kinematics",
+    "linuxcnc",
     "motion",
     "plot",
     "robot",

@@ -61,6 +61,7 @@ COMMANDS: Final = (
     "export-c cogiro --out c.c",
     "export-scl article-prototype --out prototype.scl",
     "export-fmu cogiro --out cogiro.fmu",
+    "export-linuxcnc cogiro --out kins.c",
     "track winches_robot.yaml own_path.yaml --no-figures --json --out wound",
     "encoder wound/hall-winches-catenary.nc --out counts.csv",
     "run --json --out the_run",

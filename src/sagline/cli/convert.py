@@ -1,4 +1,4 @@
-"""`sagline convert`, `export-c`, `export-scl` and `export-fmu`: files for other tools, controllers and simulations."""
+"""`sagline convert` and the commands `export-...`: files for other tools, controllers, machines and simulations."""
 
 from __future__ import annotations
 
@@ -36,6 +36,14 @@ class _Fmi(StrEnum):
 
     FMI2 = "2"
     FMI3 = "3"
+
+
+class _Unit(StrEnum):
+    """Units of lengths of a machine."""
+
+    MM = "mm"
+    INCH = "inch"
+    M = "m"
 
 
 LEAST = 1e-6  # smallest position error that is printed [m]
@@ -237,3 +245,32 @@ def export_fmu(
     show_text(
         f"{path}: {loaded.name} for FMI {fmi.value}, with {inputs.value} of {loaded.cable_count} winches", whole=True
     )
+
+
+def export_linuxcnc(
+    robot: str = opt.ROBOT,
+    out: Path = opt.out(Path("cablekins.c")),
+    pose: Any = opt.POSE,
+    unit: _Unit = opt.choice(_Unit.MM, "UNIT", "Unit of lengths of the machine", _Unit),
+    tension: str = opt.TENSION,
+) -> None:
+    """Write the kinematics of a robot as a module for LinuxCNC: forward and inverse with sagging cables.
+
+    The module is a C source, which `halcompile --install` compiles. A file with settings for the INI file of the
+    machine is written beside it; the lengths at --pose are the home positions.
+
+    For example:
+
+        sagline export-linuxcnc cogiro --out cablekins.c
+        sagline export-linuxcnc own_robot.yaml --unit inch --out my_kins.c
+    """
+    loaded = sl.load_robot(robot)
+    target = file_of(out, "cablekins.c")
+    if target.suffix != ".c":
+        raise sl.FileError(target, "is not a valid name for a C source", f"Let it end in .c: {target.stem}.c.")
+    kind: Any = unit.value
+    source, settings = sl.export_linuxcnc(
+        loaded, target.parent, name=target.stem, unit=kind, tension=opt.tension_named(tension), home=pose
+    )
+    show_text(f"{source}: kinematics of {loaded.name}; halcompile --install {source.name}", whole=True)
+    show_text(f"{settings}: settings for the INI file of the machine", whole=True)

@@ -28,7 +28,7 @@ GROUPS = {  # the subcommands in the order in which the help lists them
     "Lengths and tensions": ("track", "lengths", "encoder", "forward", "tension"),
     "Motion and workspace": ("simulate", "vibrate", "workspace", "sweep"),
     "Pages": ("view", "share"),
-    "Machines": ("control", "twin", "log", "export-c", "export-scl", "export-fmu"),
+    "Machines": ("control", "twin", "log", "export-c", "export-scl", "export-fmu", "export-linuxcnc"),
     "The article": ("run", "article", "experiment"),
     "Installation": ("examples", "cache"),
 }
@@ -41,6 +41,7 @@ MODULES = {  # modules of the subcommands whose module has another name
     "export-c": "convert",
     "export-scl": "convert",
     "export-fmu": "convert",
+    "export-linuxcnc": "convert",
     "run": "article",
     "experiment": "article",
     "examples": "installation",

@@ -89,7 +89,7 @@ def export_c(
         raise InvalidValueError("tension", "empty", "a method or several", "Give a method, for example Closest().")
     chosen = [method_of(method) for method in methods]
     path = checked_name(file_path(file), ".c", "C source", "sagline")
-    source, header = _source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
+    source, header = source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
     texts = {path: source, path.with_suffix(".h"): header, path.with_suffix(".scl"): filled("c/sagline.scl", {})}
     with atomic_files(path.parent, [place.name for place in texts]) as partials:
         for partial, text in zip(partials, texts.values(), strict=True):
@@ -98,7 +98,7 @@ def export_c(
     return source_path, beside, scl
 
 
-def _source_of(
+def source_of(
     robot: Robot, methods: Sequence[TensionMethod], forward: bool, real: type[np.floating], stem: str
 ) -> tuple[str, str]:
     """Compose the C99 source and header of a robot, with numbers of type float64 or float32."""
@@ -180,7 +180,7 @@ def _words(
         "cables": str(m),
         "freedoms": str(n),
         "translations_count": str(n - int(turning.sum())),
-        "methods": ", ".join(_method_names(methods)),
+        "methods": ", ".join(method_names(methods)),
         "rules": ",\n    ".join(_rule(each, real) for each in options),
         "limits_of": str(options[0].limits[0]),
         "statuses": _statuses(),
@@ -193,7 +193,7 @@ def _words(
     }
 
 
-def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
+def method_names(methods: Sequence[TensionMethod]) -> list[str]:
     """C name of each method: the name of its class, with a number if several methods have this class."""
     found: list[str] = []
     for method in methods:

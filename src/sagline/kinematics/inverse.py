@@ -221,9 +221,9 @@ def _out_of_plane(robot: Robot, pose: Pose) -> Array:
     return distance
 
 
-def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
+def equilibrium_at(robot: Robot, pose: PoseLike, tension: TensionMethod | str = DEFAULT) -> Equilibrium:
     """Equilibrium at `pose`, a pose or a batch. An infeasible single pose raises an error that names the shortfall."""
-    plan = inverse(robot, pose)
+    plan = inverse(robot, pose, tension=tension)
     if not plan.state.pose.shape and not plan.feasible:
         why, short = PoseStatus(int(plan.status)), float(plan.shortfall)
         value = why.name + (f", {n(short, '.4g', 'N')} short" if np.isfinite(short) else "")

@@ -10,6 +10,7 @@ import numpy as np
 
 from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, locked
+from sagline.files.c_calls import AnyArray
 from sagline.kernels import tables
 from sagline.kernels.cable.batch import cable_courses
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS
@@ -21,7 +22,7 @@ from sagline.robot.batch import has_routing, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
-from sagline.share.packing import AnyArray, Call, PackedColumn, described_calls, encode_columns
+from sagline.share.packing import Call, PackedColumn, described_calls, encode_columns
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import DEFAULT
