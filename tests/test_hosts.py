@@ -5,7 +5,6 @@ A new host is a function of `HOSTS`: it computes some of the answers of `expecte
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -19,11 +18,9 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.share.machine import model_data
-from sagline.statics.tables import pose_rows
 from tests.files.c_programs import Program
 from tests.linuxcnc import Module, World
-from tests.share.programs import in_node
+from tests.share.programs import answers_in_node
 from tests.tiers import extended
 
 ACCURACY: Final = 1e-12  # m
@@ -87,9 +84,7 @@ def c_source(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
 
 def web_assembly(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
     """The module of shared pages, in node."""
-    lengths, starts = expected(robot, pose)["length"], pose_rows(pose)
-    rows = [{"pose": row.tolist(), "given": given.tolist()} for row, given in zip(starts, lengths, strict=True)]
-    found = json.loads(in_node(model_data(robot), rows, folder, repeat=0))["found"]
+    found = answers_in_node(robot, pose, expected(robot, pose)["length"], folder)
     position = np.array([each["rest"]["pose"]["position"] for each in found])
     names = {"length": "length", "chord_tension": "tension"}
     return {"position": position} | {name: np.array([each[key] for each in found]) for name, key in names.items()}

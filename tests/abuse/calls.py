@@ -887,7 +887,7 @@ def _files(given: _Given) -> dict[str, Call]:
                 folder=("folder", str(folder)),
                 name=("text", "cablekins"),
                 unit=("word", "inch"),
-                tension=("method", sl.Closest()),
+                tension=("one", sl.Closest()),
                 home=("one", given.pose, True),
             ),
         ),

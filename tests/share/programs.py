@@ -14,7 +14,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+import sagline as sl
 from sagline.core.arrays import Array
+from sagline.share.machine import model_data
 from sagline.share.packing import module_text
 from tools.translate import wasm
 
@@ -52,6 +54,14 @@ def in_node(machine: dict[str, Any], rows: Rows, folder: Path, repeat: int | Non
     given = json.dumps(request | ({} if repeat is None else {"repeat": repeat}))
     command = ["node", str(Path(__file__).with_name("node.js")), str(scripts)]
     return subprocess.run(command, input=given.encode(), capture_output=True, check=True).stdout
+
+
+def answers_in_node(robot: sl.Robot, pose: sl.Pose, lengths: Array, folder: Path) -> list[dict[str, Any]]:
+    """Answers of robot.js at poses, and at rest with lengths (N, m) [m] off the drums."""
+    poses = np.hstack((pose.position, pose.quaternion))
+    rows = [{"pose": row.tolist(), "given": given.tolist()} for row, given in zip(poses, lengths, strict=True)]
+    found: list[dict[str, Any]] = json.loads(in_node(model_data(robot), rows, folder, repeat=0))["found"]
+    return found
 
 
 def compiled_kernels(folder: Path) -> Path:
