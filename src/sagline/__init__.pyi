@@ -42,6 +42,7 @@ from .dynamics import simulate as simulate
 from .dynamics import vibration as vibration
 from .files import *
 from .files import dump_robot as dump_robot
+from .files import load_gcode as load_gcode
 from .files import load_log as load_log
 from .files import load_path as load_path
 from .files import load_plan as load_plan

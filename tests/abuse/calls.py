@@ -858,6 +858,7 @@ def _files(given: _Given) -> dict[str, Call]:
         "Simulation.save": Call(simulation.save, _all(file=("file", str(folder / "saved.nc")))),
         "load_simulation": Call(sl.load_simulation, _all(file=("file", str(folder / "sim.nc")))),
         "load_robot": Call(sl.load_robot, _all(name_or_path=("file", names["robot.yaml"]))),
+        **_programs(folder),
         "load_path": Call(sl.load_path, _all(file=("file", names["path.csv"]))),
         "load_measurements": Call(sl.load_measurements, _all(file=("file", names["cable.csv"]))),
         "load_wirex": Call(sl.load_wirex, _all(source=("file", names["robot.wcrfx"]), cables=cable)),
@@ -909,6 +910,24 @@ def _files(given: _Given) -> dict[str, Call]:
             sl.dump_mjcf,
             _all(robot=("one", given.robot), pose=("one", given.pose), unstrained_length=("array", given.length, True)),
         ),
+    }
+
+
+def _programs(folder: Path) -> dict[str, Call]:
+    (folder / "part.ngc").write_text("G1 X1 F60\nX2 Y1\n", encoding="utf-8")
+    arguments = _all(
+        file=("file", str(folder / "part.ngc")),
+        rapid=("number", 0.5),
+        acceleration=("number", 1.0),
+        tolerance=("number", 0.001),
+        offsets=("one", {"G54": (0.0, 0.0, 1.0)}, True),
+        start=("array", [0.0, 0.0, 1.0], True),
+        dialect=("word", "marlin", True),
+        rate=("number", 100.0),
+    )
+    return {
+        "load_gcode": Call(sl.load_gcode, arguments),
+        "gcode_parts": Call(lambda **given: list(sl.gcode_parts(**given)), arguments),
     }
 
 

@@ -166,6 +166,20 @@ def _caspr_beside(other: str, text: str) -> Callable[[Path], Any]:
     return read
 
 
+PROGRAM = """\
+%
+N10 G21 G90 G17 (a part) ; metric
+G0 X0 Y0 Z1500
+G64 P1 F6000
+G1 X500 Y-250.5
+G2 X700 Y-50.5 I200 J0
+G20 G91
+G3 X2 Z.5 R4 F300
+G4 P0.25
+G92 X0 Y0
+G18 G90 G1 X10 Z60
+M30
+"""
 COLUMNS = """\
 columns:
   time: {name: t, unit: ms}
@@ -187,6 +201,7 @@ READERS: Final = (
     Reader("robot.yaml", ROBOT, sl.load_robot),
     Reader("tour.yaml", WAYPOINTS, sl.load_path),
     Reader("tour.csv", PATH, sl.load_path),
+    Reader("part.ngc", PROGRAM, sl.load_path),
     Reader("lengths.csv", LENGTHS, lambda file: load_readings(file, "length", 4, 5.0)),
     Reader("counts.csv", COUNTS, lambda file: load_readings(file, "count", 4)),
     Reader("cable.csv", MEASURED, sl.load_measurements),

@@ -36,6 +36,10 @@ NUMBERS = (
 )
 
 
+# in a program, "5 m 5" has two words, and "1;5" a comment: see tests/files/test_gcode_refusals.py
+TABLES = [reader for reader in READERS if reader.name != "part.ngc"]
+
+
 def places(sample: str) -> list[tuple[int, int]]:
     """Positions of the numbers in a sample, except in names and in the header."""
     head = sample.index("\n") + 1 if sample.startswith("<?xml") else 0
@@ -46,7 +50,7 @@ def cases(count: int, words: tuple[str, ...]) -> list[tuple[Reader, int, int, st
     rng = np.random.default_rng(20260110)
     chosen = []
     for k in range(count):
-        reader = READERS[k % len(READERS)]
+        reader = TABLES[k % len(TABLES)]
         spans = places(reader.sample)
         start, end = spans[int(rng.integers(len(spans)))]
         chosen.append((reader, start, end, words[int(rng.integers(len(words)))]))
@@ -94,4 +98,4 @@ def test_the_samples_are_valid(tmp_path: Path) -> None:
         found = judged(lambda: reader.read(reader.written(tmp_path, reader.sample.encode())), reader.name)  # noqa: B023
         assert not isinstance(found, SaglineError), str(found)
         sound(found, reader.name)
-        assert len(places(reader.sample)) > 5
+        assert reader not in TABLES or len(places(reader.sample)) > 5

@@ -271,7 +271,7 @@ def test_text_other_than_a_waypoint_file(tmp_path: FilePath, text: str, parts: t
 
 
 def test_another_suffix_is_refused(tmp_path: FilePath) -> None:
-    with refused("the suffix", ".txt", ".yaml, .yml, .csv", kind=FileError):
+    with refused("the suffix", ".txt", ".yaml, .yml, .csv, .ngc, .nc, .tap, .gcode, .gco", kind=FileError):
         load_path(write(tmp_path, "run.txt", "time,x,y,z\n0,1,2,3\n1,1,2,3\n"))
 
 

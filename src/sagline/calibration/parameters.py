@@ -173,7 +173,11 @@ def checked_unknowns(unknowns: Sequence[str | Unknown], sensors: Sensors, *, str
     if not given:
         raise InvalidValueError("unknowns", "none", "at least one", f"Name some of {', '.join(KINDS)}.")
     items = [
-        one for item in given for one in (_default_unknowns(sensors, straight=straight) if item == DEFAULT else (item,))
+        one
+        for item in given
+        for one in (
+            _default_unknowns(sensors, straight=straight) if isinstance(item, str) and item == DEFAULT else (item,)
+        )
     ]
     found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
     names = [one.name for one in found]

@@ -55,7 +55,9 @@ _BREAKS: list[str] | None = opt.option(
 def simulate(
     name: str = opt.ROBOT,
     path: Path | None = opt.argument(
-        None, "PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the platform is at rest at --pose."
+        None,
+        "PATH",
+        "Waypoints in .yaml, times and poses in .csv, or G-code in .ngc. Default: the platform is at rest at --pose.",
     ),
     pose: Any = opt.if_only(opt.POSE, opt.only_without("PATH")),
     shaper: _ShaperKind = opt.choice(

@@ -26,7 +26,7 @@ FIGURES = ("path", "velocity", "cables", "error")
 def track(
     robot: str = opt.ROBOT,
     path: Path | None = opt.argument(
-        None, "PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the article's path."
+        None, "PATH", "Waypoints in .yaml, times and poses in .csv, or G-code in .ngc. Default: the article's path."
     ),
     model: str = opt.MODEL,
     tension: str = opt.TENSION,

@@ -5,6 +5,9 @@ from .c_source import export_scl as export_scl
 from .calibration_file import load_calibration as load_calibration
 from .caspr import load_caspr as load_caspr
 from .execution_file import load_execution as load_execution
+from .gcode_file import ProgramPart as ProgramPart
+from .gcode_file import gcode_parts as gcode_parts
+from .gcode_file import load_gcode as load_gcode
 from .log_file import load_log as load_log
 from .mesh_file import load_mesh as load_mesh
 from .mjcf import dump_mjcf as dump_mjcf

@@ -1,4 +1,4 @@
-"""Path files: waypoints or calibration poses in YAML, or samples of time and pose in CSV."""
+"""Path files: waypoints or calibration poses in YAML, samples of time and pose in CSV, or programs in G-code."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from sagline.calibration.observations import counts_at, has_drum_data
 from sagline.core.arguments import file_path
 from sagline.core.arrays import FARTHEST, Array
 from sagline.core.errors import FileError, InvalidValueError
+from sagline.files.gcode_file import SUFFIXES, load_gcode
 from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry
 from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
@@ -76,7 +77,7 @@ def _check_columns(table: CsvTable) -> None:
 
 
 def load_path(file: str | os.PathLike[str]) -> Path:
-    """Read a path from a file of waypoints (.yaml, .yml) or of sampled poses (.csv).
+    """Read a path from a file of waypoints (.yaml, .yml) or of sampled poses (.csv), or from a program in G-code.
 
     A YAML file contains waypoints. Between two waypoints, the platform moves from rest to rest (see `quintic_path`). A
     quantity is a number in SI (lengths in m, angles in rad) or a text with its unit:
@@ -98,6 +99,8 @@ def load_path(file: str | os.PathLike[str]) -> Path:
 
     The length of a quaternion may differ from 1 by 1e-3, because decimals are rounded; quaternions are normalized.
 
+    A program in G-code (.ngc, .nc, .tap, .gcode, .gco) is read with the default settings of `load_gcode`.
+
     Args:
         file: The file; its suffix selects the format.
 
@@ -114,9 +117,12 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     path = file_path(file)
     yaml, table = (_path_from_yaml, YAML_LIMIT), (_path_from_table, TABLE_LIMIT)
     readers = {".yaml": yaml, ".yml": yaml, ".csv": table}
+    if path.suffix.lower() in SUFFIXES:
+        return load_gcode(path)
     if path.suffix.lower() not in readers:
-        step = "Give waypoints as .yaml, or time and pose as .csv."
-        raise FileError.of(path, InvalidValueError("the suffix", path.suffix or "missing", ", ".join(readers), step))
+        step = "Give waypoints as .yaml, time and pose as .csv, or G-code as .ngc."
+        allowed = ", ".join((*readers, *SUFFIXES))
+        raise FileError.of(path, InvalidValueError("the suffix", path.suffix or "missing", allowed, step))
     reader, limit = readers[path.suffix.lower()]
     text = read_text(path, limit)
     with value_errors(path):
