@@ -12,6 +12,7 @@ from . import interference as interference
 from . import kinematics as kinematics
 from . import linuxcnc as linuxcnc
 from . import motion as motion
+from . import mujoco as mujoco
 from . import optimization as optimization
 from . import plc as plc
 from . import plot as plot

@@ -150,6 +150,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _twins,
         _controls,
         _sweeps,
+        _engines,
     ):
         table |= part(given)
     return table
@@ -1387,4 +1388,28 @@ def _in_time(given: _Given) -> dict[str, Call]:
         "Brake": Call(sl.Brake, _all(time=("number", 0.5), winch=("whole", 3, True), duration=("number", 0.25))),
         "Drop": Call(sl.Drop, _all(mass=("number", 3.0), time=("number", 0.5))),
         "PickUp": Call(sl.PickUp, _all(mass=("number", 3.0), time=("number", 0.5))),
+    }
+
+
+def _engines(given: _Given) -> dict[str, Call]:
+    import mujoco
+
+    body = '<body name="load" pos="1 1 2"><freejoint/><geom size="0.1" mass="79"/></body>'
+    spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    start: dict[str, tuple[Any, ...]] = {
+        "robot": ("one", given.robot),
+        "unstrained_length": ("array", given.length, True),
+        "damping": ("one", sl.Damping(1e-3), True),
+    }
+
+    def attach(spec: Any, **arguments: Any) -> None:
+        sl.mujoco.attach(spec.copy() if isinstance(spec, mujoco.MjSpec) else spec, **arguments)
+
+    words = _all(spec=("one", spec), body=("word", "load"), prefix=("text", "left/"), **start)
+    return {
+        "mujoco.attach": Call(attach, words),
+        "mujoco.model_of": Call(lambda **a: sl.mujoco.model_of(**a).to_xml(), _all(pose=("one", given.pose), **start)),
+        "mujoco.build_plugin": Call(
+            lambda **a: sl.mujoco.build_plugin(**a).name, _all(folder=("folder", str(given.folder / "plugins")))
+        ),
     }

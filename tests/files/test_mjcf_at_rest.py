@@ -7,7 +7,7 @@ from scipy.linalg import eigh
 
 from sagline import Cable, Elastic, Pose, Robot, dump_mjcf, forward, inverse, load_robot, modes, robot_names
 from sagline.core.arrays import Array
-from sagline.files.mjcf import _step_and_damping
+from sagline.files.mjcf import step_and_damping
 from tests.tiers import extended
 
 pytestmark = extended
@@ -181,5 +181,5 @@ def test_no_written_step_is_longer_than_the_robot_allows() -> None:
     for factor in 10.0 ** generator.uniform(0.0, 6.0, 50):
         stiff = robot.replace(cables=Cable(robot.cables.linear_density, factor * robot.cables.axial_stiffness))
         written = opened(dump_mjcf(stiff, pose, lengths))[0].opt.timestep
-        allowed, _, _ = _step_and_damping(stiff, pose, stiff.cables.axial_stiffness / lengths)
+        allowed, _, _ = step_and_damping(stiff, pose, stiff.cables.axial_stiffness / lengths)
         assert 0.9 * allowed < written <= allowed * (1.0 + 1e-15)

@@ -13,9 +13,15 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 import sagline.jax
 from sagline.core.arrays import Array
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.loads import cable_loads
+from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS
+from sagline.robot.batch import has_routing
 from sagline.share.machine import courses_at
 from sagline.statics.slopes import KernelStates
 from sagline.statics.stiffness import compliance_of, least_stiffness
+from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.method import LIMITS_OF
 from tests.kinematics.test_underconstrained import places, suspended
 from tests.record.poses import METHODS, MODELS
@@ -246,6 +252,22 @@ def meshes() -> None:
     sl.clearance(state_of(sl.load_robot("cogiro")), wedge)
 
 
+def loads(robot: sl.Robot) -> None:
+    """Loads of the cables along a motion: taut, slack and moving cables, with and without losses."""
+    start, m, random = state_of(robot), robot.cable_count, np.random.default_rng(4)
+    state, wrenches = np.zeros(STATE_COLUMNS), np.zeros((2, 6))
+    rows, now, data = np.full((g.CABLE_ROWS, m), np.nan), np.zeros((d.DRIVE_ROWS, m)), np.zeros((d.DATA_ROWS, m))
+    state[:7] = pose_rows(start.pose)[0]
+    terms = (sl.Catenary().code, 0.0, 0.0, robot.gravity, has_routing(robot) or None)
+    for factor in (1.0, 1.0001, 1.0002, 1.02, 0.999):
+        for losses in ((0.0, 0.0), (1e-3, 0.1)):
+            state[7:] = random.normal(size=6)
+            now[d.RATE] = random.normal(size=m)
+            rows[g.LENGTH] = factor * start.unstrained_length
+            given = terms, losses, cable_table(robot)[0], body_table(robot)[0], data
+            cable_loads(*given, state, np.empty((3, 3)), rows, now, wrenches)
+
+
 def entries() -> None:
     """Every entry for every set of argument types."""
     for name in ("cogiro", "ipanema-3-pulleys"):
@@ -253,6 +275,7 @@ def entries() -> None:
         there_and_back(robot, 4, 1)
         statics(robot, 4)
         dynamics(robot)
+        loads(robot)
         calibration(robot)
     poses = poses_of(robot, 2, 1)
     sl.structure_matrix(robot, poses)

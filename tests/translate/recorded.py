@@ -42,6 +42,7 @@ CALLERS = (
     "tension",
     "workspaces",
 )
+INPUTS = "tests.translate.inputs"  # calls entries that only C calls
 
 
 class Call(NamedTuple):
@@ -165,7 +166,7 @@ def recorded() -> Iterator[list[Call]]:
 def _owners() -> Iterator[Any]:
     """Modules outside of the kernels and their classes, which may contain an entry under another name."""
     for key, module in list(sys.modules.items()):
-        if key.startswith("sagline.") and not key.startswith("sagline.kernels"):
+        if key == INPUTS or (key.startswith("sagline.") and not key.startswith("sagline.kernels")):
             yield module
             yield from (each for each in vars(module).values() if isinstance(each, type) and each.__module__ == key)
 

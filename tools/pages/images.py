@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import shutil
 import sys
@@ -24,6 +25,7 @@ import numpy as np
 from PIL import Image, PngImagePlugin
 
 import sagline as sl
+from tools.pages.scene import draw_robot, drawn_cables
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -307,6 +309,7 @@ def places() -> Iterator[list[float]]:
 GROUPS: Final[dict[str, tuple[list[str], Callable[[], dict[str, Any]], Callable[[], dict[str, bytes]]]]] = {
     # name -> files, their description, their drawing
     "drag": (["drag.webp", "drag-dark.webp"], shared_robot, film_shared),
+    "mujoco": (["mujoco.png"], drawn_cables, draw_robot),
     "position-error": (["position-error.png"], plotted_errors, draw_errors),
     "viewer": (
         ["viewer.png"],
@@ -364,6 +367,7 @@ def description_of(file: Path) -> Any:
 
 def main(names: list[str]) -> None:
     """Draw the named groups of pictures, or all."""
+    os.environ.setdefault("MUJOCO_GL", "egl")  # the renderer of MuJoCo needs no window
     for name in names or GROUPS:
         _, describe, draw = GROUPS[name]
         description = describe()

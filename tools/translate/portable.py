@@ -48,6 +48,7 @@ K1, K2, K3 = (ArrayType(each.element, each.rank, constant=True) for each in (s.F
 DISTRIBUTION: Final = plain_tuple(s.INT, s.FLOAT, s.INT, K1, K1)
 INVERSE: Final = (s.MODEL, DISTRIBUTION, s.LIMITS, plain_tuple(K2, K2, K3), K2, K2, s.F1, s.MEMORY)
 ANSWERS: Final = (s.ANSWERS, s.INT, s.INT)
+LOADS: Final = (plain_tuple(s.FLOAT, s.FLOAT), K2, K1, K2, s.F1, s.F2, s.F2, s.F2, s.F2)
 FORWARD: Final = (s.BOOL, plain_tuple(K2, K2, K3, K2, K2, K2), s.CHAIN, s.MEMORY, s.FOUND)
 # constants of the kernels that follow from the rounding of numbers, for single precision
 SINGLE: Final = {
@@ -97,6 +98,10 @@ SIMULATION: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (  # of `sagl
     ("run_massless", "run_bare", (plain_tuple(*s.DYNAMIC_MODEL, NONE), *RUN)),
     ("run_massless", "run_over_pulleys", (plain_tuple(*s.DYNAMIC_MODEL, s.BOOL), *RUN)),
     ("platform_state", "platform_state", s.SIGNATURES["platform_state"][""]),
+)
+ENGINES: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (  # of `sagline.mujoco`, in double precision only
+    ("cable_loads", "loads_bare", (plain_tuple(*s.DYNAMIC_MODEL, NONE), *LOADS)),
+    ("cable_loads", "loads_over_pulleys", (plain_tuple(*s.DYNAMIC_MODEL, s.BOOL), *LOADS)),
 )
 
 
@@ -204,7 +209,7 @@ def _record(*items: Value) -> Record:
 def build(root: Path) -> None:
     """Write the data of the package below a source tree."""
     with constants(OMITTED):
-        double = list(parts((*ENTRIES, *SIMULATION)))
+        double = list(parts((*ENTRIES, *SIMULATION, *ENGINES)))
     with constants({**SINGLE, **OMITTED}):
         single = [(names, in_single(text)) for names, text in parts(ENTRIES)]
     found: dict[str, Any] = {

@@ -51,6 +51,7 @@ RUN: Final = (plain_tuple(*[INT] * 5), plain_tuple(*[FLOAT] * 4), BODY, F2, COUR
 INVERSE: Final = (MODEL, DISTRIBUTION, LIMITS, ROBOTS, F2, F2, F1, MEMORY)
 RULE: Final = plain_tuple(F2, F2, F3, F3)  # spectral elements: nodes, weights, slopes, integrals
 DYNAMIC_MODEL: Final = (INT, FLOAT, FLOAT, FLOAT)
+LOADS: Final = (plain_tuple(FLOAT, FLOAT), F2, F1, F2, F1, F2, F2, F2, F2)
 
 
 # argument types of each entry, by the entry's name and the key of the set
@@ -61,6 +62,10 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
     "begin_period": {"": (plain_tuple(F1, F1, F1), F1, F1, F2, COURSE, F1, I1, BOOL, BOOL, FLOAT)},
     "cable_courses": {"": (F2, F1, F1, F1, INT, F2, F2, F3)},
     "cable_geometries": {"": (F3, F2, F2, F2, F3)},
+    "cable_loads": {
+        "": (plain_tuple(*DYNAMIC_MODEL, NONE), *LOADS),
+        "pulleys": (plain_tuple(*DYNAMIC_MODEL, BOOL), *LOADS),
+    },
     "closures": {"": (*STATE, F1)},
     "creep_strains": {"": (F1, F2, F1, F1, FLAGS1, F2)},
     "cut_piece": {"": (F1, F2, F2)},

@@ -32,12 +32,13 @@ def library_command(compiler: list[str], source: Path, library: Path, *options: 
     return [*compiler, *FLAGS, *before, *options, str(source), "-o", str(library), *after]
 
 
-def compile_library(source: Path, library: Path, file: Path) -> None:
+def compile_library(source: Path, library: Path, file: Path, *options: str) -> None:
     """Compile a source with the first compiler that can. FileError, with the name of the result `file`, if none can."""
+    chosen = options or ("-O2",)
     reasons = ["no C compiler is found"]
     for compiler in compilers():
         try:
-            done = subprocess.run(library_command(compiler, source, library, "-O2"), capture_output=True, text=True)
+            done = subprocess.run(library_command(compiler, source, library, *chosen), capture_output=True, text=True)
         except OSError as error:
             reasons.append(f"{shlex.join(compiler)}: {error}")
             continue

@@ -131,22 +131,20 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
     """
     instance(robot, Robot, "robot")
     pose = single_pose(pose)
-    lengths = _lengths_at_rest(robot, pose) if unstrained_length is None else _check_lengths(robot, unstrained_length)
+    lengths = _lengths_at_rest(robot, pose) if unstrained_length is None else checked_lengths(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths
     start, side, missing = _lead_of(robot, pose)
     over_pulley = pulleys_of(robot).radius > 0.0
-    time_step, stretch_time, drag = _step_and_damping(robot, pose, stiffness)
+    time_step, stretch_time, drag = step_and_damping(robot, pose, stiffness)
     root = Element("mujoco", model=robot.name)
     root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
-    _add(root, "compiler", angle="radian", inertiafromgeom="false")
-    step = f"{_DOWN.create_decimal_from_float(time_step):g}"
     # implicitfast integrates damping implicitly, so that damping does not limit the time step
-    _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator="implicitfast")
-    radius = _RADIUS * _add_view(root, robot)
-    world = _add(root, "worldbody")
+    world, radius = add_world(root, robot, time_step, "implicitfast")
     for i, point in enumerate(start):
         _add(world, "site", name=f"frame_{i}", pos=point, size=radius)
-    _add_platform(world, robot, pose, radius, drag)
+    platform = add_platform(world, robot, pose, radius, drag)
+    for i, point in enumerate(robot.platform_anchors):
+        _add(platform, "site", name=f"platform_{i}", pos=point, size=radius)
     _add_pulleys(world, robot, pose, side)
     listed = _add(root, "tendon")
     for i, length in enumerate(lengths):
@@ -167,7 +165,16 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
+def add_world(root: Element, robot: Robot, time_step: float, integrator: str) -> tuple[Element, float]:
+    """Add gravity, time step [s], view and world. Returns the world and the radius of drawn cable ends [m]."""
+    _add(root, "compiler", angle="radian", inertiafromgeom="false")
+    step = f"{_DOWN.create_decimal_from_float(time_step):g}"
+    _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator=integrator)
+    radius = _RADIUS * _add_view(root, robot)
+    return _add(root, "worldbody"), radius
+
+
+def step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
     """Time step [s], ratio of damping to stiffness of the cables [s], and damping of the joints [N s/m, N m s/rad]."""
     # The joint damping is zero if the cables resist every motion. At every pose, the squared angular frequency has a
     # bound: the sum over the cables of stiffness times the largest mobility of the platform end. Forces that rotate
@@ -204,7 +211,8 @@ def _lengths_at_rest(robot: Robot, pose: Pose) -> Array:
     return plan.unstrained_length
 
 
-def _check_lengths(robot: Robot, lengths: ArrayLike) -> Array:
+def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
+    """Unstrained lengths (m,) off the drum [m], each longer than its dead length."""
     array = checked(lengths, "unstrained_length", "m", low=_SHORTEST)
     if array.shape != (robot.cable_count,):
         raise InvalidValueError(
@@ -227,7 +235,8 @@ def _add_view(root: Element, robot: Robot) -> float:
     return size
 
 
-def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag: float) -> None:
+def add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag: float) -> Element:
+    """Add the platform at `pose`, with joints of the damping `drag`."""
     x, y, z, w = pose.quaternion
     body = _add(world, "body", name="platform", pos=pose.position, quat=(w, x, y, z))
     _add_joints(body, robot, pose, drag)
@@ -238,8 +247,7 @@ def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag:
     edges = high - low if robot.platform_size is None else robot.platform_size
     half = np.maximum(0.5 * edges, max(0.5 * _THINNEST * float(edges.max()), radius))
     _add(body, "geom", type="box", pos=0.5 * (low + high), size=half, **_DRAWN)
-    for i, point in enumerate(robot.platform_anchors):
-        _add(body, "site", name=f"platform_{i}", pos=point, size=radius)
+    return body
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
