@@ -71,9 +71,10 @@ def attach(
     Examples:
         >>> import mujoco
         >>> import sagline as sl
-        >>> text = '<mujoco><worldbody><body name="load" pos="0 0 2"><freejoint/>'
-        >>> text += '<geom type="box" size=".5 .5 .5" mass="79"/></body></worldbody></mujoco>'
-        >>> spec = mujoco.MjSpec.from_string(text)
+        >>> spec = mujoco.MjSpec()
+        >>> load = spec.worldbody.add_body(name="load", pos=(0.0, 0.0, 2.0))
+        >>> joint = load.add_freejoint()
+        >>> box = load.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.5] * 3)
         >>> sl.mujoco.attach(spec, sl.load_robot("cogiro"), body="load")
         >>> model = spec.compile()
         >>> model.nu, model.nsensordata
