@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final
 
 import fmpy
+import mujoco
 import numpy as np
 import pytest
 
@@ -113,9 +114,26 @@ def linuxcnc(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
     return dict(zip(("length", "chord_tension", "position"), columns, strict=True))
 
 
+def physics_engine(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
+    """The plug-in for MuJoCo at rest, after 20 steps."""
+    found = []
+    for k in range(len(pose)):
+        spec = sl.mujoco.model_of(robot, pose[k])
+        length = np.array(spec.plugins[0].config["unstrained_length"].split(), dtype=np.float64)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, nstep=20)
+        mujoco.mj_forward(model, data)
+        found.append((length, np.array(data.sensor("tensions").data), np.array(data.body("platform").xpos)))
+    columns = (np.array(column) for column in zip(*found, strict=True))
+    return dict(zip(("length", "frame_end_tension", "position"), columns, strict=True))
+
+
 Host = Callable[[sl.Robot, sl.Pose, Path], Answers]
-HOSTS: Final[tuple[Host, ...]] = (c_source, linuxcnc, unit_of_co_simulation, plain_python, web_assembly)
-QUICK: Final = (c_source, linuxcnc)  # in the first tier, with the first robot
+HOSTS: Final[tuple[Host, ...]] = (
+    c_source, linuxcnc, physics_engine, unit_of_co_simulation, plain_python, web_assembly,
+)  # fmt: skip
+QUICK: Final = (c_source, linuxcnc, physics_engine)  # in the first tier, with the first robot
 ROBOTS: Final = ("article-prototype", "ipanema-3-pulleys")
 
 
