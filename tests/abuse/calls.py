@@ -90,10 +90,21 @@ def _of_class(name: str, kind: type) -> set[str]:
 # results, made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
-    | {"Clearances", "FrequencySlopes", "WinchDrive"}
+    | {"BendingCycles", "Clearances", "FrameForces", "FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
-    | {"Components", "Front", "Margin", "MovingAnchors", "Proof", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
+    | {
+        "Components",
+        "Front",
+        "Margin",
+        "MotionSet",
+        "MovingAnchors",
+        "Proof",
+        "Surface",
+        "Workspace",
+        "WrenchSet",
+        "sweep.Sweep",
+    }
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Uncertainty", "Vibration", "WinchRates"}
     | {"Calibration", "CalibrationPoses", "PoseError"}
 )
@@ -104,7 +115,7 @@ CRITERIA = ("Clearance", "Criterion", "InFrame", "LeastFrequency", "LeastMargin"
 TABULAR = (
     *("Confirmation", "Equilibria", "Equilibrium", "ForwardSolution", "FrequencyMap", "FrequencyResponse", "Margin"),
     *("Modes", "MovingAnchors", "Path", "Simulation", "TensionPolygon", "Vibration", "WinchRates", "control.Execution"),
-    *("Clearances", "Uncertainty", "WinchLog"),
+    *("BendingCycles", "Clearances", "FrameForces", "Uncertainty", "WinchLog"),
 )
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
@@ -169,6 +180,8 @@ class _Given:
         self.plan = sl.inverse(self.robot, self.pose)
         self.path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], durations=1.0, rate=4.0)
         self.run = sl.inverse(self.robot, self.path)
+        limited = self.robot.replace(winches=sl.Winch(drum_radius=0.06, speed_limit=30.0))
+        self.driven = sl.inverse(limited, self.pose).state
         self.hung = sl.Catenary().from_tension(self.cable, [10.0, 11.0, 12.0], 2.0, 100.0)
         self.length = self.plan.unstrained_length
 
@@ -474,6 +487,7 @@ def _winding(given: _Given) -> dict[str, Call]:
                 temperature=warmer,
             ),
         ),
+        "bending_cycles": Call(sl.bending_cycles, _all(plan=("one", run), elements=("whole", 50))),
         "winch_rates": Call(sl.winch_rates, _all(plan=("one", run))),
         "Creep": Call(sl.Creep, _all(axial_stiffness=("array", [1e6, 4e5]), time=("array", [30.0, 1200.0]))),
         "Creep.strain": Call(
@@ -654,6 +668,10 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 ax=("ax", Figure().add_subplot(), True),
             ),
         ),
+        "speed_set": Call(sl.speed_set, _all(state=("one", given.driven))),
+        "acceleration_set": Call(sl.acceleration_set, _all(state=("one", given.driven))),
+        "MotionSet.pure": Call(sl.speed_set(given.driven).pure, _all(direction=("array", [1.0, 0.0, 0.5]))),
+        "MotionSet.extent": Call(sl.speed_set(given.driven).extent, _all(direction=("array", [1.0, 0.0, 0.5]))),
         "load_workspace": Call(sl.load_workspace, _all(file=("file", given.folder / "workspace.nc"))),
         "prove": Call(
             sl.prove,

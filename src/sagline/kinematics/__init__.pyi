@@ -1,5 +1,7 @@
 """Public names of `sagline.kinematics`."""
 
+from .bending import BendingCycles as BendingCycles
+from .bending import bending_cycles as bending_cycles
 from .confirm import Confirmation as Confirmation
 from .confirm import confirm as confirm
 from .equilibria import Equilibria as Equilibria
@@ -9,6 +11,7 @@ from .forward import forward as forward
 from .forward_rows import ForwardSolution as ForwardSolution
 from .forward_solver import ForwardSolver as ForwardSolver
 from .forward_solver import ForwardStep as ForwardStep
+from .frame_forces import FrameForces as FrameForces
 from .home import home as home
 from .inverse import inverse as inverse
 from .inverse_solver import InverseSolver as InverseSolver

@@ -16,6 +16,7 @@ from sagline.core.arrays import Array, Codes, Flags, locked
 from sagline.core.results import Result, Saved
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import tables
+from sagline.kinematics.frame_forces import FrameForces, frame_forces_of
 from sagline.kinematics.inverse_rows import solve_inverse_rows
 from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.kinematics.uncertainty import Uncertainty
@@ -188,6 +189,28 @@ class Plan(Result, Saved, Tabular):
 
         return smallest_stiffness(self.state)
 
+    def frame_forces(self) -> FrameForces:
+        """Compute the forces of the cables on anchors, pulleys and winches, for the design of the frame.
+
+        Returns:
+            FrameForces; NaN where the plan has no solution.
+
+        Raises:
+            InvalidValueError: If the plan has one robot per pose, or the winches have `guides`.
+
+        Examples:
+            >>> import sagline as sl
+            >>> robot = sl.load_robot("cogiro")
+            >>> path = sl.quintic_path([(0, 0, 2), (2, 1, 2.5)], durations=2.0)
+            >>> found = sl.inverse(robot, path).frame_forces()
+            >>> print(found.magnitude.max(axis=0).round(), "N")
+            [402. 372. 463. 426. 503. 559. 441. 408.] N
+
+        Source:
+            Force balance of the cable on its pulley and in its guide; docs/model.md, section 10.
+        """
+        return frame_forces_of(self.state, self.path)
+
     def uncertainty(self) -> Uncertainty:
         """Compute the errors of poses and tensions that the tolerances of the robot cause, by first order.
 
@@ -290,18 +313,11 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
         return locked(rates)
     closest = isinstance(tension, Closest)
     motion, step = _motion_near(state.robot, path, state.wrench, ONE_SIDED if closest else 1.0)
-    options = kernel_options(state.robot, state.cables.model, tension)
     reference = shared_tension(state, tension.variable) if closest else np.full(state.cables.shape[-1], np.nan)
 
     def lengths(h: float) -> Array:
-        """Unstrained lengths (N, m) at the time `h` after each sample, with the guides and friction of the state."""
-        pose, wrench = motion(h)
-        found = solve_inverse_rows(state.robot, tension, options, pose_rows(pose), locked(wrench), reference)
-        if state.contact is None:
-            bare: Array = found.results[tables.LENGTH]
-            return bare
-        reached = cables_of_results(state.robot, state.cables.model, found.results, found.cable_status, pose.shape)
-        return with_routing(Equilibrium(state.robot, pose, wrench, *reached), state.contact.winding).unstrained_length
+        """Unstrained lengths (N, m) at the time `h` after each sample."""
+        return lengths_near(state, tension, *motion(h), reference)
 
     now, after = state.unstrained_length, lengths(step)
     if closest:  # a step backward would cross active limits
@@ -315,6 +331,17 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
         best = np.where(np.isnan(best), change / step, best)
     rates[kept] = best[kept]
     return locked(rates)
+
+
+def lengths_near(state: Equilibrium, tension: TensionMethod, pose: Pose, wrench: Array, reference: Array) -> Array:
+    """Unstrained lengths (N, m) at poses near a state, with its guides and friction; reference: for `Closest`."""
+    options = kernel_options(state.robot, state.cables.model, tension)
+    found = solve_inverse_rows(state.robot, tension, options, pose_rows(pose), locked(wrench), reference)
+    if state.contact is None:
+        bare: Array = found.results[tables.LENGTH]
+        return bare
+    reached = cables_of_results(state.robot, state.cables.model, found.results, found.cable_status, pose.shape)
+    return with_routing(Equilibrium(state.robot, pose, wrench, *reached), state.contact.winding).unstrained_length
 
 
 def _motion_near(

@@ -12,7 +12,7 @@ from sagline.core.progress import blocks, rows_of
 from sagline.kernels import tables
 from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for
-from sagline.robot.batch import has_routing
+from sagline.robot.batch import has_routing, outward
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import kernel_length
 from sagline.statics.tables import pose_rows, robot_terms
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from sagline.kernels.forward.platform import ForwardTerms
 
 BLOCK = 1 << 12  # number of samples per block, which takes about 0.1 s; Ctrl-C is handled between blocks
-_TINY = 1e-300
 
 
 class CableSlopes(NamedTuple):
@@ -113,13 +112,15 @@ def motions_of_ends(levers: Array) -> Array:
 
 
 def platform_end_forces(state: Equilibrium) -> Array:
-    """Forces (m, 3) on the cables at their platform ends, world axes [N]; for a state with a single pose."""
-    reach = (state.pose.transform(state.one_robot.platform_anchors) - state.exit_point)[:, :2]
-    level = reach / np.maximum(np.hypot(reach[:, 0], reach[:, 1]), _TINY)[:, None]
-    return np.column_stack((level * state.cables.horizontal_tension[:, None], state.cables.vertical_force))
+    """Forces (..., m, 3) on the cables at their platform ends, world axes [N]."""
+    azimuth = None if state.contact is None else state.contact.azimuth
+    level = outward(state.robot, state.pose) if azimuth is None else np.stack((np.cos(azimuth), np.sin(azimuth)), -1)
+    sideways = level * state.cables.horizontal_tension[..., None]
+    return np.concatenate((sideways, state.cables.vertical_force[..., None]), axis=-1)
 
 
 def frame_end_forces(state: Equilibrium) -> Array:
-    """Forces (m, 3) that cables exert on their frame ends, world axes [N]; for a state with a single pose."""
-    weight = state.cables.cable_weight[:, None] * np.array([0.0, 0.0, 1.0])
-    return np.asarray(platform_end_forces(state) - weight)
+    """Forces (..., m, 3) that the free spans exert on the frame at their exit points, world axes [N]."""
+    forces = platform_end_forces(state)
+    forces[..., 2] -= state.cables.cable_weight
+    return forces

@@ -11,6 +11,9 @@ from .criterion import Criterion as Criterion
 from .margin import Margin as Margin
 from .margin import MarginStatus as MarginStatus
 from .margin import margin as margin
+from .motion_sets import MotionSet as MotionSet
+from .motion_sets import acceleration_set as acceleration_set
+from .motion_sets import speed_set as speed_set
 from .proof import Proof as Proof
 from .proof import ProofVerdict as ProofVerdict
 from .proof import prove as prove

@@ -204,7 +204,7 @@ def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) ->
     """Bounds on the squared speed of the curve parameter that follow from the speed limits of the winches."""
     if not _has_speed_limits(robot):
         return lambda parameter: profiles.HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
-    fastest_cable = _fastest_rates(robot, rest.unstrained_length)
+    fastest_cable = fastest_rates(robot, rest.unstrained_length)
 
     def bounds(parameter: Array) -> profiles.HalfPlanes:
         jet = curve.at(parameter)
@@ -220,7 +220,7 @@ def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) ->
     return bounds
 
 
-def _fastest_rates(robot: Robot, length: Array) -> Array:
+def fastest_rates(robot: Robot, length: Array) -> Array:
     """Largest length rates of the winches [m/s], at the lengths `length` (N, m)."""
     winch = robot.winches
     assert winch is not None
@@ -233,6 +233,6 @@ def _fastest_rates(robot: Robot, length: Array) -> Array:
 def _speed_excess(plan: Plan) -> float:
     """Largest ratio of a winch speed in `plan` to its limit, at least 1."""
     assert plan.length_rate is not None
-    limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
+    limits = fastest_rates(plan.state.one_robot, plan.unstrained_length)
     ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))
     return ratio * (1.0 + _SLOWER) if ratio > 1.0 else 1.0
