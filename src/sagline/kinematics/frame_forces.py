@@ -16,7 +16,6 @@ from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import tension_after
 from sagline.robot.winch import Winch
-from sagline.statics.slopes import frame_end_forces
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -77,6 +76,8 @@ class FrameForces(Result, Tabular):
 
 def frame_forces_of(state: Equilibrium, path: Path | None) -> FrameForces:
     """Forces of the cables on the frame; see `Plan.frame_forces`."""
+    from sagline.statics.slopes import frame_end_forces  # not needed for a plan alone
+
     robot, contact, exit_force = state.one_robot, state.contact, frame_end_forces(state)
     winches = robot.winches
     if winches is not None and winches.guides is not None:
