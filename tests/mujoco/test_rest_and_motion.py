@@ -171,6 +171,37 @@ def test_a_winch_with_the_dynamics_of_an_integrator_has_a_speed() -> None:
     np.testing.assert_array_equal(data.actuator_force, data.sensor("tensions").data)
 
 
+def test_a_winch_with_the_dynamics_of_a_filter_follows_its_control() -> None:
+    plan, change, delay = sl.inverse(COGIRO, (0.0, 0.0, 2.0)), np.linspace(-0.005, 0.008, 8), 0.03
+    damping, time = sl.Damping(loss_time=2e-3), np.linspace(0.0, 0.1, 4001)
+    lengths = (time, plan.unstrained_length + (1.0 - np.exp(-time / delay))[:, None] * change)
+    run = sl.simulate(plan, unstrained_length=lengths, damping=damping, step=2.5e-5, record=0.1)
+    spec = sl.mujoco.model_of(COGIRO, (0.0, 0.0, 2.0), damping=damping)
+    for winch in spec.actuators:
+        winch.dyntype = mujoco.mjtDyn.mjDYN_FILTER
+        winch.dynprm[0] = delay
+    model, data = started(spec, 2.5e-4)
+    data.ctrl[:] = change
+    mujoco.mj_step(model, data, nstep=round(0.1 / model.opt.timestep))
+    mujoco.mj_forward(model, data)
+    assert distance(run.pose[-1], plan.state.pose)[0] > 1e-3
+    assert distance(pose_of(data), run.pose[-1])[0] < 1e-8
+    np.testing.assert_allclose(data.sensor("tensions").data, run.tensions[-1], rtol=1e-5)
+
+
+def test_a_limited_control_changes_the_length_up_to_its_limit() -> None:
+    found = []
+    for control, limited in ((0.02, True), (0.004, False)):
+        spec = sl.mujoco.model_of(COGIRO, (0.0, 0.0, 2.0))
+        for winch in spec.actuators:
+            winch.ctrlrange, winch.ctrllimited = (-0.001, 0.004), limited
+        model, data = started(spec)
+        data.ctrl[:] = control
+        mujoco.mj_step(model, data, nstep=10)
+        found.append(data.qpos.copy())
+    np.testing.assert_array_equal(*found)
+
+
 @pytest.mark.parametrize("name", wide(["cogiro", "ipanema-3-pulleys"], first=2))
 def test_a_restored_state_continues_with_the_same_bits(name: str) -> None:
     robot = sl.load_robot(name)
