@@ -20,11 +20,13 @@ from sagline.kernels.algebra import functions
 from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.models import (
+    CLOSE,
+    ORDINARY,
     SMALL_HALLEY_STEP,
     catenary_end,
-    closure_error,
     from_length,
     from_tension,
+    halley_step,
     relative_excess,
 )
 from sagline.kernels.cable.pulley import (
@@ -38,7 +40,7 @@ from sagline.kernels.cable.pulley import (
     softness,
     straight_behind,
 )
-from sagline.kernels.cable.swivel import energy_of_swivel, solve_swivel
+from sagline.kernels.cable.swivel import energy_of_swivel, solve_swivels
 from sagline.kernels.cable.terms import Material, Model, PlaneStiffness, chord_at, material_at
 from sagline.kernels.jit import formula, glue
 
@@ -266,19 +268,8 @@ def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
     return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, _wrap_at(rows, i), free)
 
 
-CLOSE = 0.1  # relative first step up to which two Halley steps are accurate
-ORDINARY = 2.0  # largest h at which the polynomials have full precision
 PASSES = 30  # largest number of passes for cables over pulleys; from a nearby pose, one or two are sufficient
 MISSED = 1e-13  # largest error of the platform end, relative to the cable's length
-
-
-@formula
-def _halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float) -> float:
-    """One Halley step on P2 (docs/model.md, section 2) for h <= 2, without branches."""
-    y = h * h
-    more = h * y * functions.sinh_excess_polynomial(y)  # sinh h - h
-    error, slope, bend = closure_error(h, (h + more, more, functions.cosh_polynomial(y)), xi2, zeta2, kappa, excess)
-    return h - error * slope / (slope * slope - error * bend)
 
 
 @formula
@@ -304,11 +295,11 @@ def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, r
     for i in range(m):
         xi2 = _square_share(span[i], length[i])
         zeta2 = _square_share(rise[i], length[i])
-        rows[g.FIRST, i] = _halley_step(rows[g.PARAMETER, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
+        rows[g.FIRST, i] = halley_step(rows[g.PARAMETER, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
     for i in range(m):
         xi2 = _square_share(span[i], length[i])
         zeta2 = _square_share(rise[i], length[i])
-        rows[g.SECOND, i] = _halley_step(rows[g.FIRST, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
+        rows[g.SECOND, i] = halley_step(rows[g.FIRST, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
 
 
 @formula
@@ -329,8 +320,7 @@ def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool |
         bare = (rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])
         _solve_equivalent_cables(model, cables, bare, rows)
     elif tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-        for i in range(cables.shape[0]):
-            solve_swivel(model, cables, rows, i)
+        solve_swivels(model, cables, rows)
     else:
         asked = (rows[g.ASKED_SPAN], rows[g.ASKED_RISE], rows[g.ASKED_LENGTH], rows[g.SOFT])
         _start_passes(cables, rows)

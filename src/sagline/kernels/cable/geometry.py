@@ -135,11 +135,17 @@ WRAP, WRAP_SINE, WRAP_COSINE = LENGTH + 24, LENGTH + 25, LENGTH + 26  # psi [rad
 LEAVING, TOTAL = LENGTH + 27, LENGTH + 28  # tension T_A at the exit point, and T_A + T_B [N]
 BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # length between chord and drum; end of the free span [m]
 ACROSS = LENGTH + 32  # stiffness normal to the plane [N/m]
-CABLE_ROWS = LENGTH + 33
+# Swivel axes of any direction: platform end relative to the frame anchor [m]; length between tangent and drum [m];
+# errors of the platform end in the last pass and after it, relative to the length
+END_AT_X, END_AT_Y, END_AT_Z = LENGTH + 33, LENGTH + 34, LENGTH + 35
+TO_DRUM, MISS, LEFT = LENGTH + 36, LENGTH + 37, LENGTH + 38
+CABLE_ROWS = LENGTH + 39
 # Cables with a swivel axis of any direction use rows of the passes, which they do not need, for numbers in world axes:
-# stiffness [N/m]; dT/dL [N/m]; force at the platform end [N]; unstrained length on the pulley [m].
+# stiffness [N/m]; dT/dL [N/m]; force at the platform end [N]; correction of the tangent, as in the OFF rows [m]; unit
+# vector from the axis to the center of the pulley; unstrained length on the pulley [m].
 W_XX, W_XY, W_XZ, W_YY, W_YZ, W_ZZ = ASKED_SPAN, ASKED_RISE, ASKED_LENGTH, OFF_X, OFF_Z, OFF_LENGTH
 LONGER_X, LONGER_Y, LONGER_Z = KAPPA, EXCESS, FIRST
 FORCE_X, FORCE_Y, FORCE_Z = SECOND, END_X, END_Z
-END_AT_X, END_AT_Y, END_AT_Z = XX, XZ, ZX  # platform end relative to the anchor at the last solution [m]
+AWAY_X, AWAY_Y, AWAY_Z = XX, XZ, ZX
+CENTER_X, CENTER_Y, CENTER_Z = ZZ, SOFT, TOTAL
 WRAPPED = BEHIND

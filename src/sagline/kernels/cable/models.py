@@ -30,6 +30,8 @@ CATENARY_STEPS = 80
 # Halley's method cubes it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
+CLOSE = 0.1  # relative first step up to which two Halley steps are accurate
+ORDINARY = 2.0  # largest h at which the polynomials have full precision
 SPLIT = 134217729.0  # 2^27 + 1, factor that splits the mantissa of a number into two halves
 
 
@@ -233,6 +235,15 @@ def closure_error(
     slope = 2.0 * (xi2 * a * alpha1 + zeta2 * e * eta1)
     bend = xi2 * (alpha1 * alpha1 + a * alpha2) + zeta2 * (eta1 * eta1 + e * eta2)
     return error, slope, bend
+
+
+@formula
+def halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float) -> float:
+    """One Halley step on P2 (docs/model.md, section 2) for h <= 2, without branches."""
+    y = h * h
+    more = h * y * functions.sinh_excess_polynomial(y)  # sinh h - h
+    error, slope, bend = closure_error(h, (h + more, more, functions.cosh_polynomial(y)), xi2, zeta2, kappa, excess)
+    return h - error * slope / (slope * slope - error * bend)
 
 
 @formula

@@ -18,22 +18,32 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.functions import angle, atanhc_excess
+from sagline.kernels.algebra.functions import angle, atanhc_excess, cosh_polynomial, sinhc_polynomial
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.models import catenary_end, from_length, slack_series
+from sagline.kernels.cable.models import (
+    CLOSE,
+    ORDINARY,
+    SMALL_HALLEY_STEP,
+    catenary_end,
+    catenary_from_length,
+    from_length,
+    halley_step,
+    relative_excess,
+    slack_series,
+)
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Material, Model
-from sagline.kernels.jit import entry, formula, kernel
+from sagline.kernels.jit import entry, formula, glue, kernel
 
 Vector = tuple[float, float, float]
 
-ROUNDS = 60  # largest number of Newton steps for one cable; a taut cable needs three
+PASSES = 12  # largest number of passes of the equivalent cable; a taut cable needs two
+ROUNDS = 60  # largest number of Newton steps for one cable
+NEAR = 1e-13  # error of the platform end that a correction of the force removes, relative to the length
 CLOSED = 3e-15  # error of the platform end that counts as zero, relative to the cable's length
 MISSED = 1e-12  # largest accepted error of the platform end, relative to the cable's length
-NEARBY = 0.1  # largest predicted relative change of a force from which the last solution is the start
 SHORTENINGS = 30  # of one Newton step
 STILL = 1e-10  # change of the free length, relative to the length, after which its error is far below 1e-13
-SMALL_TURN = 1e-7  # [rad], change of the swivel angle after which the next change is a rounding error
 LENGTHS = 12  # passes for the free length
 SHORTEST = 1e-3  # shortest free length, relative to the whole length
 TINY = 1e-300
@@ -100,57 +110,53 @@ def _strains(swivel: Swivel, tension: float, zeta: float) -> tuple[float, float,
     return leaving, entering, math.sqrt(entering * entering - 2.0 * weighs * swivel.rise)
 
 
-@kernel
+@formula
 def exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
-    """Exit point of a cable whose force at the exit point is (`x`, `y`, `z`), toward the platform end [N]."""
+    """Exit point of a cable whose force at the exit point is (`x`, `y`, `z`), toward the platform end [N].
+
+    Without weight on the pulley, e_r is in the plane of force and axis. The weight turns it by the angle whose tangent
+    is -k e_s.z/(v F.e_r - k e_r.z), with e_r and e_s of this plane. The wrap angle changes by the square of this angle.
+    """
     nx, ny, nz = swivel.x, swivel.y, swivel.z
     radius = swivel.radius
     along = x * nx + y * ny + z * nz
     rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
-    across = math.sqrt(rx * rx + ry * ry + rz * rz)
-    tension = math.sqrt(across * across + along * along)
+    square = rx * rx + ry * ry + rz * rz
+    across = math.sqrt(square)
+    tension = math.sqrt(square + along * along)
     if not across > 0.0:  # along the axis: any direction normal to the axis
         rx, ry, rz = (1.0 - nx * nx, -nx * ny, -nx * nz) if abs(nx) < 0.8 else (-nx * ny, 1.0 - ny * ny, -ny * nz)
-    inverse = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
+    inverse = 1.0 / (across if across > 0.0 else math.sqrt(rx * rx + ry * ry + rz * rz))
     rx, ry, rz = rx * inverse, ry * inverse, rz * inverse
+    sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
     strained = 1.0 + tension / swivel.stiffness
-    weight = swivel.weight * radius * radius / strained
-    wrap = angle(across, along)
-    outward, length = across, tension + TINY
-    for _ in range(3 if radius > 0.0 and weight > 0.0 and nx * nx + ny * ny > 0.0 else 0):
+    weight = swivel.weight * radius / strained
+    inverse = 1.0 / (tension + TINY)
+    first = angle(across, along)
+    sine, cosine, wrap = across * inverse, along * inverse, first
+    if weight > 0.0:
+        straight_sine, straight_cosine = sine, cosine
+        c, s = 1.0, 0.0  # of the turn about the axis
+        for _ in range(2):
+            moment = weight * (wrap - sine)
+            slope = (1.0 - cosine) * across - moment * rz
+            turn = -moment * sz / slope if slope > 0.0 else 0.0
+            turn = min(max(turn, -0.5), 0.5)
+            c = 1.0 / math.sqrt(1.0 + turn * turn)
+            s = turn * c
+            outward = across * c
+            inverse = 1.0 / (math.sqrt(outward * outward + along * along) + TINY)
+            sine, cosine = outward * inverse, along * inverse
+            less = straight_sine * cosine - straight_cosine * sine  # sine of the decrease of the wrap angle
+            square = less * less
+            wrap = first - less * (1.0 + square * (1.0 / 6.0 + square * 0.075))
+        rx, ry, rz = c * rx + s * sx, c * ry + s * sy, c * rz + s * sz
         sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
-        moment = weight * (wrap - outward / length)  # k
-        arm = radius * (1.0 - along / length)  # v
-        slope = arm * outward - moment * rz
-        turned = 0.0
-        if slope > 0.0:
-            turned = (arm * (x * sx + y * sy + z * sz) - moment * sz) / slope
-            turned = min(max(turned, -0.5), 0.5)
-            rx, ry, rz = rx + turned * sx, ry + turned * sy, rz + turned * sz
-            inverse = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
-            rx, ry, rz = rx * inverse, ry * inverse, rz * inverse
-        outward = x * rx + y * ry + z * rz
-        length = math.sqrt(outward * outward + along * along) + TINY
-        wrap = angle(max(outward, 0.0), along)
-        if slope > 0.0 and abs(turned) < SMALL_TURN:
-            break
-    sine, cosine = outward / length, along / length
     zeta, integral = _height(swivel, rz, sine, cosine, wrap)
-    strained, entering, drawn = _strains(swivel, tension, zeta)
-    beta = swivel.weight * radius / swivel.stiffness
-    return Exit(
-        rx,
-        ry,
-        rz,
-        ny * rz - nz * ry,
-        nz * rx - nx * rz,
-        nx * ry - ny * rx,
-        sine,
-        cosine,
-        wrap,
-        radius * (wrap + beta * integral / (strained * strained)) / strained,
-        2.0 * swivel.dead / (entering + drawn),
-    )
+    _strained, entering, drawn = _strains(swivel, tension, zeta)
+    inverse = 1.0 / strained
+    wrapped = radius * (wrap + swivel.weight * radius / swivel.stiffness * integral * inverse * inverse) * inverse
+    return Exit(rx, ry, rz, sx, sy, sz, sine, cosine, wrap, wrapped, 2.0 * swivel.dead / (entering + drawn))
 
 
 @formula
@@ -190,158 +196,80 @@ def free_compliance(
     )
 
 
-@formula
-def _inverse_of_three(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector, Vector]:
-    """Rows of the inverse of the 3 x 3 matrix with the rows `a`, `b` and `c`."""
-    x, y, z = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
-    inverse = 1.0 / (a[0] * x + a[1] * y + a[2] * z)
-    return (
-        (inverse * x, inverse * (a[2] * c[1] - a[1] * c[2]), inverse * (a[1] * b[2] - a[2] * b[1])),
-        (inverse * y, inverse * (a[0] * c[2] - a[2] * c[0]), inverse * (a[2] * b[0] - a[0] * b[2])),
-        (inverse * z, inverse * (a[1] * c[0] - a[0] * c[1]), inverse * (a[0] * b[1] - a[1] * b[0])),
-    )
+@kernel
+def fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
+    """Fill stiffness K [N/m] and dT/dL = -K dB/dL [N/m] of cable `i`. `end`: force at the platform end [N].
 
-
-@formula
-def _add_product(rows: Array, i: int, one: Vector, other: Vector) -> None:
-    """Add the symmetric part of `one` times `other` to the six numbers of cable `i`."""
-    rows[g.W_XX, i] += one[0] * other[0]
-    rows[g.W_XY, i] += 0.5 * (one[0] * other[1] + one[1] * other[0])
-    rows[g.W_XZ, i] += 0.5 * (one[0] * other[2] + one[2] * other[0])
-    rows[g.W_YY, i] += one[1] * other[1]
-    rows[g.W_YZ, i] += 0.5 * (one[1] * other[2] + one[2] * other[1])
-    rows[g.W_ZZ, i] += one[2] * other[2]
-
-
-@formula
-def _equations_by_unknowns(swivel: Swivel, at: Exit, force: Vector) -> tuple[Vector, Vector, Vector]:
-    """Derivatives of the three equations of the exit by psi, by the swivel angle and by the free length.
-
-    The equations: F.e_rho = 0, v F.e_s - k e_s.z = 0, and the sum of all lengths. `force`: F at the exit point [N].
+    The compliance follows from three equations for psi, the swivel angle and the free length: F.e_rho = 0, v F.e_s - k
+    e_s.z = 0, and the sum of all lengths. F is the force at the exit point.
     """
-    x, y, z = force
-    w, radius, rz, sz, nz = swivel.weight, swivel.radius, at.rz, at.sz, swivel.z
-    along = x * swivel.x + y * swivel.y + z * swivel.z
-    outward = x * at.rx + y * at.ry + z * at.rz
-    sideways = x * at.sx + y * at.sy + z * at.sz
-    tension = math.sqrt(x * x + y * y + z * z)
-    zeta, _integral = _height(swivel, rz, at.sine, at.cosine, at.wrap)
-    e, entering, drawn = _strains(swivel, tension, zeta)
-    beta, v = w * radius / swivel.stiffness, radius * (1.0 - at.cosine)
-    k = w * radius * radius * (at.wrap - at.sine) / e
-    bends = _by_stretch(swivel, entering, drawn)
-    up = at.sine * rz + at.cosine * nz  # t.z
-    cube = e * e * e
-    lag = at.wrap * (1.0 - at.cosine) - (at.wrap - at.sine)
-    turning = -v * outward + k * rz
-    return (
-        (outward * at.sine + along * at.cosine, -at.cosine * sideways, -w * (at.sine * nz - at.cosine * rz)),
-        (
-            radius * at.sine * sideways - w * radius * v / e * sz,
-            turning if abs(turning) > TINY else -1.0,  # an eyelet, or a cable along its axis: any swivel angle
-            -w * sz * (v + k / (e * swivel.stiffness) * z / tension),
-        ),
-        (
-            radius / e + radius * beta * at.wrap * up / cube - 2.0 * beta * bends * up,
-            sz * beta * (radius * lag / cube - 2.0 * bends * (1.0 - at.cosine)),
-            1.0 - w * _length_by_tension(swivel, at, tension) * z / tension,
-        ),
-    )
-
-
-@formula
-def _by_stretch(swivel: Swivel, entering: float, drawn: float) -> float:
-    """Lambda [m]: the dead length's derivative is 2 lambda E per change of the stretch E at the exit point."""
-    total = entering + drawn
-    return -swivel.dead / (total * total) * (1.0 / entering + 1.0 / drawn)
-
-
-@formula
-def _length_by_tension(swivel: Swivel, at: Exit, tension: float) -> float:
-    """Derivative of the unstrained length between exit point and drum by the tension at the exit point [m/N]."""
-    radius = swivel.radius
-    zeta, integral = _height(swivel, at.rz, at.sine, at.cosine, at.wrap)
-    e, entering, drawn = _strains(swivel, tension, zeta)
-    square = e * e
-    falls = 3.0 * radius * swivel.weight * radius / swivel.stiffness * integral / (square * square)
-    return (2.0 * _by_stretch(swivel, entering, drawn) * e - radius * at.wrap / square - falls) / swivel.stiffness
-
-
-@kernel
-def fill_compliance(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
-    """Fill the compliance C and dB/dL of cable `i`, world axes. `end`: force at the platform end [N]."""
     x, y, z = end[0], end[1], end[2] - swivel.weight * free
+    w, radius, rz, sz, nz = swivel.weight, swivel.radius, at.rz, at.sz, swivel.z
+    sine, cosine, wrap = at.sine, at.cosine, at.wrap
     tension = math.sqrt(x * x + y * y + z * z)
-    a, b, c = _inverse_of_three(*_equations_by_unknowns(swivel, at, (x, y, z)))
-    e, v = 1.0 + tension / swivel.stiffness, swivel.radius * (1.0 - at.cosine)
-    ux, uy, uz = x / tension, y / tension, z / tension  # F/T
-    # derivatives of the three equations by F: e_rho, `second` and `third`
-    moment = swivel.weight * swivel.radius * swivel.radius * (at.wrap - at.sine) / (e * e * swivel.stiffness) * at.sz
-    by_tension = _length_by_tension(swivel, at, tension)
-    px, py, pz = (
-        at.sine * swivel.x - at.cosine * at.rx,
-        at.sine * swivel.y - at.cosine * at.ry,
-        at.sine * swivel.z - at.cosine * at.rz,
-    )
-    qx, qy, qz = v * at.sx + moment * ux, v * at.sy + moment * uy, v * at.sz + moment * uz
-    turn = (
-        -(a[0] * px + a[1] * qx + a[2] * by_tension * ux),
-        -(a[0] * py + a[1] * qy + a[2] * by_tension * uy),
-        -(a[0] * pz + a[1] * qz + a[2] * by_tension * uz),
-    )
-    swing = (
-        -(b[0] * px + b[1] * qx + b[2] * by_tension * ux),
-        -(b[0] * py + b[1] * qy + b[2] * by_tension * uy),
-        -(b[0] * pz + b[1] * qz + b[2] * by_tension * uz),
-    )
-    grow = (
-        -(c[0] * px + c[1] * qx + c[2] * by_tension * ux),
-        -(c[0] * py + c[1] * qy + c[2] * by_tension * uy),
-        -(c[0] * pz + c[1] * qz + c[2] * by_tension * uz),
-    )
-    radius = swivel.radius
-    tx, ty, tz = (
-        radius * (at.sine * at.rx + at.cosine * swivel.x),
-        radius * (at.sine * at.ry + at.cosine * swivel.y),
-        radius * (at.sine * at.rz + at.cosine * swivel.z),
-    )
-    for k in range(6):
-        rows[g.W_XX + k, i] = 0.0
-    _add_product(rows, i, (tx, ty, tz), turn)
-    _add_product(rows, i, (v * at.sx, v * at.sy, v * at.sz), swing)
-    _add_product(rows, i, (e * ux, e * uy, e * uz), grow)
-    rows[g.LONGER_X, i] = tx * a[2] + v * at.sx * b[2] + e * ux * c[2]
-    rows[g.LONGER_Y, i] = ty * a[2] + v * at.sy * b[2] + e * uy * c[2]
-    rows[g.LONGER_Z, i] = tz * a[2] + v * at.sz * b[2] + e * uz * c[2]
-    _add_free_span(swivel, end, free, rows, i)
-
-
-@formula
-def _add_free_span(swivel: Swivel, end: Vector, free: float, rows: Array, i: int) -> None:
-    """Add the compliance of the free span to that of cable `i`."""
-    horizontal = math.sqrt(end[0] * end[0] + end[1] * end[1])
-    c, s = (end[0] / horizontal, end[1] / horizontal) if horizontal > 0.0 else (1.0, 0.0)
-    xx, xz, zz, across = free_compliance(horizontal, end[2], free, swivel.weight, swivel.stiffness)
-    rows[g.W_XX, i] += xx * c * c + across * s * s
-    rows[g.W_XY, i] += (xx - across) * c * s
-    rows[g.W_XZ, i] += xz * c
-    rows[g.W_YY, i] += xx * s * s + across * c * c
-    rows[g.W_YZ, i] += xz * s
-    rows[g.W_ZZ, i] += zz
-
-
-@kernel
-def fill_stiffness(rows: Array, i: int) -> None:
-    """Replace the compliance of cable `i` by the stiffness K [N/m], and dB/dL by dT/dL = -K dB/dL [N/m]."""
-    xx, xy, xz = rows[g.W_XX, i], rows[g.W_XY, i], rows[g.W_XZ, i]
-    yy, yz, zz = rows[g.W_YY, i], rows[g.W_YZ, i], rows[g.W_ZZ, i]
-    a, b, c = _inverse_of_three((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    rows[g.W_XX, i], rows[g.W_XY, i], rows[g.W_XZ, i] = a
-    rows[g.W_YY, i], rows[g.W_YZ, i], rows[g.W_ZZ, i] = b[1], b[2], c[2]
-    x, y, z = rows[g.LONGER_X, i], rows[g.LONGER_Y, i], rows[g.LONGER_Z, i]
-    rows[g.LONGER_X, i] = -(a[0] * x + a[1] * y + a[2] * z)
-    rows[g.LONGER_Y, i] = -(b[0] * x + b[1] * y + b[2] * z)
-    rows[g.LONGER_Z, i] = -(c[0] * x + c[1] * y + c[2] * z)
+    zeta, integral = _height(swivel, rz, sine, cosine, wrap)
+    e, entering, drawn = _strains(swivel, tension, zeta)
+    soft, inverse = 1.0 / swivel.stiffness, 1.0 / e
+    beta, v = w * radius * soft, radius * (1.0 - cosine)
+    # lambda: the dead length's derivative is 2 lambda E per change of the stretch E at the exit point [m]
+    total = 1.0 / (entering + drawn)
+    bends = -swivel.dead * total * total * (entering + drawn) / (entering * drawn)
+    square, cube = inverse * inverse, inverse * inverse * inverse
+    by_tension = (2.0 * bends * e - radius * wrap * square - 3.0 * radius * beta * integral * cube * inverse) * soft
+    up = sine * rz + cosine * nz  # t.z
+    slip = wrap - sine
+    k = w * radius * radius * slip * inverse
+    moment = k * inverse * soft * sz
+    unit = 1.0 / tension
+    ux, uy, uz = x * unit, y * unit, z * unit  # F/T
+    along = x * swivel.x + y * swivel.y + z * nz
+    outward = x * at.rx + y * at.ry + z * rz
+    sideways = x * at.sx + y * at.sy + z * at.sz
+    # derivatives of the equations by the unknowns, row by row
+    turning = -v * outward + k * rz
+    a0, a1, a2 = outward * sine + along * cosine, -cosine * sideways, -w * (sine * nz - cosine * rz)
+    b0 = radius * sine * sideways - w * radius * v * inverse * sz
+    b1 = turning if abs(turning) > TINY else -1.0  # an eyelet, or a cable along its axis: any swivel angle
+    b2 = -w * (sz * v + moment * uz)
+    c0 = radius * inverse + radius * beta * wrap * up * cube - 2.0 * beta * bends * up
+    c1 = sz * beta * (radius * (wrap * (1.0 - cosine) - slip) * cube - 2.0 * bends * (1.0 - cosine))
+    c2 = 1.0 - w * by_tension * uz
+    # inverse of this matrix, with the motion of the end by each unknown: motions of the end by each equation
+    i00, i01, i02 = b1 * c2 - b2 * c1, a2 * c1 - a1 * c2, a1 * b2 - a2 * b1
+    i10, i11, i12 = b2 * c0 - b0 * c2, a0 * c2 - a2 * c0, a2 * b0 - a0 * b2
+    i20, i21, i22 = b0 * c1 - b1 * c0, a1 * c0 - a0 * c1, a0 * b1 - a1 * b0
+    inverse = 1.0 / (a0 * i00 + a1 * i10 + a2 * i20)
+    turn, swing, grow = radius * inverse, v * inverse, e * inverse
+    tx, ty, tz = sine * at.rx + cosine * swivel.x, sine * at.ry + cosine * swivel.y, up
+    p0, p1, p2 = turn * i00, swing * i10, grow * i20
+    ax, ay, az = p0 * tx + p1 * at.sx + p2 * ux, p0 * ty + p1 * at.sy + p2 * uy, p0 * tz + p1 * sz + p2 * uz
+    p0, p1, p2 = turn * i01, swing * i11, grow * i21
+    bx, by, bz = p0 * tx + p1 * at.sx + p2 * ux, p0 * ty + p1 * at.sy + p2 * uy, p0 * tz + p1 * sz + p2 * uz
+    p0, p1, p2 = turn * i02, swing * i12, grow * i22
+    cx, cy, cz = p0 * tx + p1 * at.sx + p2 * ux, p0 * ty + p1 * at.sy + p2 * uy, p0 * tz + p1 * sz + p2 * uz
+    # derivatives of the equations by F, with the opposite sign
+    px, py, pz = cosine * at.rx - sine * swivel.x, cosine * at.ry - sine * swivel.y, cosine * rz - sine * nz
+    qx, qy, qz = -v * at.sx - moment * ux, -v * at.sy - moment * uy, -v * sz - moment * uz
+    sx, sy, sz = -by_tension * ux, -by_tension * uy, -by_tension * uz
+    # the compliance, with the free span
+    horizontal = math.sqrt(x * x + y * y)
+    c, s = (x / horizontal, y / horizontal) if horizontal > 0.0 else (1.0, 0.0)
+    free_xx, free_xz, free_zz, across = free_compliance(horizontal, end[2], free, w, swivel.stiffness)
+    xx = ax * px + bx * qx + cx * sx + (free_xx * c * c + across * s * s)
+    yy = ay * py + by * qy + cy * sy + (free_xx * s * s + across * c * c)
+    zz = az * pz + bz * qz + cz * sz + free_zz
+    xy = 0.5 * (ax * py + bx * qy + cx * sy + ay * px + by * qx + cy * sx) + (free_xx - across) * c * s
+    xz = 0.5 * (ax * pz + bx * qz + cx * sz + az * px + bz * qx + cz * sx) + free_xz * c
+    yz = 0.5 * (ay * pz + by * qz + cy * sz + az * py + bz * qy + cz * sy) + free_xz * s
+    i00, i01, i02 = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    inverse = 1.0 / (xx * i00 + xy * i01 + xz * i02)
+    i00, i01, i02 = inverse * i00, inverse * i01, inverse * i02
+    i11, i12, i22 = inverse * (xx * zz - xz * xz), inverse * (xy * xz - xx * yz), inverse * (xx * yy - xy * xy)
+    rows[g.W_XX, i], rows[g.W_XY, i], rows[g.W_XZ, i] = i00, i01, i02
+    rows[g.W_YY, i], rows[g.W_YZ, i], rows[g.W_ZZ, i] = i11, i12, i22
+    rows[g.LONGER_X, i] = -(i00 * cx + i01 * cy + i02 * cz)
+    rows[g.LONGER_Y, i] = -(i01 * cx + i11 * cy + i12 * cz)
+    rows[g.LONGER_Z, i] = -(i02 * cx + i12 * cy + i22 * cz)
 
 
 @kernel
@@ -382,8 +310,7 @@ def _force_at(
         if miss <= CLOSED:
             break
         at = exit_of(swivel, x, y, z - swivel.weight * free)
-        fill_compliance(swivel, at, (x, y, z), free, rows, i)
-        fill_stiffness(rows, i)
+        fill_stiffness(swivel, at, (x, y, z), free, rows, i)
         dx = _product(rows, i, g.W_XX, g.W_XY, g.W_XZ, (ex, ey, ez))
         dy = _product(rows, i, g.W_XY, g.W_YY, g.W_YZ, (ex, ey, ez))
         dz = _product(rows, i, g.W_XZ, g.W_YZ, g.W_ZZ, (ex, ey, ez))
@@ -403,57 +330,194 @@ def _force_at(
     return x, y, z, free, miss
 
 
-@kernel
-def solve_swivel(model: Model, cables: Array, rows: Array, i: int) -> None:
-    """Fill force, plane, free span and exit of cable `i` from its tangent and its length.
-
-    The rows contain the tangent from the pulley to the platform end, which is replaced by the chord of the free span.
-    """
-    gravity = model.gravity if model.code == codes.CATENARY else 0.0
-    swivel = swivel_at(cables, i, gravity)
-    length = rows[g.LENGTH, i]
-    span, rise = rows[g.SPAN, i], rows[g.RISE, i]
-    cx, cy = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
-    straight = Swivel(swivel.x, swivel.y, swivel.z, swivel.radius, 0.0, 0.0, 0.0, swivel.stiffness)
-    at = exit_of(straight, span * cx, span * cy, rise)
-    px, py, pz = point_of(straight, at)
-    end = (px + span * cx, py + span * cy, pz + rise)
-    behind = swivel.radius * at.wrap + swivel.dead
-    free = length
-    miss, status = math.inf, codes.CABLE_SOLVED
-    x, y, z = 0.0, 0.0, 0.0
-    if swivel.weight > 0.0 and not math.isnan(rows[g.PARAMETER, i]):
-        x, y, z = _predicted(end, length, rows, i)
-        before = abs(rows[g.FORCE_X, i]) + abs(rows[g.FORCE_Y, i]) + abs(rows[g.FORCE_Z, i])
-        change = abs(x - rows[g.FORCE_X, i]) + abs(y - rows[g.FORCE_Y, i]) + abs(z - rows[g.FORCE_Z, i])
-        if change <= NEARBY * before:
-            last = rows[g.FREE_LENGTH, i] + (length - rows[g.PARAMETER, i])
-            x, y, z, free, miss = _force_at(swivel, end, length, (x, y, z, last), rows, i)
-    if not miss <= MISSED:
-        free = max(length - behind, SHORTEST * length)
-        soft = Material(cables[i, tables.DENSITY], swivel.stiffness / (1.0 + behind / free))
-        force, status = from_length(Model(model.code, 0.0, 0.0, gravity), span, rise, soft, free)
-        x, y, z = force.horizontal * cx, force.horizontal * cy, force.vertical
-        miss = 0.0
-        if force.tension > 0.0 or swivel.weight > 0.0:
-            x, y, z, free, miss = _force_at(swivel, end, length, (x, y, z, free), rows, i)
-    rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] = x, y, z
-    rows[g.END_AT_X, i], rows[g.END_AT_Y, i], rows[g.END_AT_Z, i] = end
-    rows[g.PARAMETER, i] = length if miss <= MISSED else math.nan
-    rows[g.STATUS, i] = status if miss <= MISSED else codes.CABLE_NOT_CONVERGED
-    _fill_rows(swivel, end, free, rows, i)
+@formula
+def _fill_equivalent_force(swivel: Swivel, rows: Array, i: int) -> None:
+    """Fill the force at the exit point of the equivalent cable `i`, which has no pulley, and its parameter h."""
+    length, behind = rows[g.LENGTH, i], rows[g.TO_DRUM, i]
+    asked = max(length - behind, SHORTEST * length)
+    soft = swivel.stiffness / (1.0 + behind / asked)
+    x = rows[g.SPAN, i] * rows[g.AZIMUTH_X, i] + rows[g.AWAY_X, i]
+    y = rows[g.SPAN, i] * rows[g.AZIMUTH_Y, i] + rows[g.AWAY_Y, i]
+    half = 0.5 * swivel.weight
+    z = rows[g.RISE, i] + (behind * half * asked / swivel.stiffness + rows[g.AWAY_Z, i])
+    square = x * x + y * y
+    span = math.sqrt(square)
+    kappa, excess = half * asked / soft, relative_excess(span, z, asked)
+    inverse = 1.0 / asked
+    xi2, zeta2 = square * inverse * inverse, z * z * inverse * inverse
+    last = rows[g.PARAMETER, i]
+    h = halley_step(last, xi2, zeta2, kappa, excess)
+    near = abs(h - last) <= CLOSE * (h + kappa) and 0.0 < h < ORDINARY
+    if near and abs(h - last) > SMALL_HALLEY_STEP * (h + kappa):
+        last = h
+        h = halley_step(last, xi2, zeta2, kappa, excess)
+        near = abs(h - last) <= SMALL_HALLEY_STEP * (h + kappa) and 0.0 < h < ORDINARY
+    if near:
+        share, y2 = half / (h + kappa), h * h
+        tangent = h * sinhc_polynomial(y2) / cosh_polynomial(y2)
+        vertical = half * (asked + z / (tangent + kappa))
+    else:
+        force, _status = catenary_from_length(span, z, asked, swivel.weight, soft)
+        h = half * math.sqrt(square + z * z) / force.tension - kappa if force.tension > 0.0 else math.nan
+        share, vertical = force.horizontal / span if span > 0.0 else 0.0, force.vertical
+    rows[g.PARAMETER, i] = h
+    rows[g.FORCE_X, i], rows[g.FORCE_Y, i] = share * x, share * y
+    rows[g.FORCE_Z, i] = vertical - swivel.weight * asked
 
 
 @formula
-def _predicted(end: Vector, length: float, rows: Array, i: int) -> Vector:
-    """First-order prediction of the force [N] at a new platform end and length, from the last force and stiffness."""
-    x, y, z = end[0] - rows[g.END_AT_X, i], end[1] - rows[g.END_AT_Y, i], end[2] - rows[g.END_AT_Z, i]
-    more = length - rows[g.PARAMETER, i]
-    return (
-        rows[g.FORCE_X, i] + _product(rows, i, g.W_XX, g.W_XY, g.W_XZ, (x, y, z)) + rows[g.LONGER_X, i] * more,
-        rows[g.FORCE_Y, i] + _product(rows, i, g.W_XY, g.W_YY, g.W_YZ, (x, y, z)) + rows[g.LONGER_Y, i] * more,
-        rows[g.FORCE_Z, i] + _product(rows, i, g.W_XZ, g.W_YZ, g.W_ZZ, (x, y, z)) + rows[g.LONGER_Z, i] * more,
+def _correct(swivel: Swivel, rows: Array, i: int) -> None:
+    """Correct the equivalent cable `i` by the error of the platform end; its force as well if the error is small."""
+    at = _stored(swivel, rows, i)
+    length, free = rows[g.LENGTH, i], rows[g.FREE_LENGTH, i]
+    x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
+    tension = math.sqrt(x * x + y * y + z * z)
+    z += swivel.weight * free
+    give, lift = _give(math.sqrt(x * x + y * y), z, free, swivel.weight, swivel.stiffness)
+    px, py, pz = point_of(swivel, at)
+    ux, uy, uz = rows[g.END_AT_X, i] - px, rows[g.END_AT_Y, i] - py, rows[g.END_AT_Z, i] - pz
+    ex, ey, ez = ux - give * x, uy - give * y, uz - lift * (z - 0.5 * swivel.weight * free)
+    miss, before = math.sqrt(ex * ex + ey * ey + ez * ez) / length, rows[g.MISS, i]
+    # stiffness of the equivalent cable along its chord, minus that normal to it; the pulley is softer sideways
+    inverse = 1.0 / math.sqrt(ux * ux + uy * uy + uz * uz)
+    ux, uy, uz = ux * inverse, uy * inverse, uz * inverse
+    normal = 1.0 / give
+    sag = 0.5 * swivel.weight * give * free * inverse
+    along = (free + rows[g.TO_DRUM, i]) / swivel.stiffness + give * sag * sag * (ux * ux + uy * uy) * (1.0 / 3.0)
+    along = 1.0 / along - normal
+    soft = swivel.radius * at.sine / ((1.0 + at.cosine) * tension)
+    tilt = ux * at.sx + uy * at.sy + uz * at.sz
+    load = normal * (ex * at.sx + ey * at.sy + ez * at.sz) + along * tilt * (ex * ux + ey * uy + ez * uz)
+    share = soft * load / (1.0 + soft * (normal + along * tilt * tilt))
+    ex, ey, ez = ex - share * at.sx, ey - share * at.sy, ez - share * at.sz
+    if not miss <= NEAR:
+        rows[g.AWAY_X, i] += ex
+        rows[g.AWAY_Y, i] += ey
+        rows[g.AWAY_Z, i] += ez
+    pull = along * (ex * ux + ey * uy + ez * uz)
+    rows[g.FORCE_X, i] = x + normal * ex + pull * ux
+    rows[g.FORCE_Y, i] = y + normal * ey + pull * uy
+    rows[g.FORCE_Z, i] = z + normal * ez + pull * uz
+    rows[g.TENSION, i] = normal  # becomes the chord tension with the chord
+    # error after this correction, as the errors of successive passes have a constant ratio; infinite if this is large
+    ratio = miss / before if before < math.inf else 1.0
+    left = miss * ratio if miss < 0.5 * before and free > 0.0 else math.inf
+    rows[g.LEFT, i] = 0.0 if miss <= NEAR else left
+    rows[g.MISS, i] = miss
+
+
+@glue
+def solve_swivels(model: Model, cables: Array, rows: Array) -> None:
+    """Fill forces, planes, free spans and exits of all cables from their tangents and lengths.
+
+    The rows contain the tangents from the pulleys to the platform ends. The chords of the free spans replace them.
+    Cables for which the passes do not converge are solved one by one, by damped Newton steps.
+    """
+    m, gravity = cables.shape[0], model.gravity if model.code == codes.CATENARY else 0.0
+    for i in range(m):
+        _fill_tangent(swivel_at(cables, i, gravity), rows, i)
+    for _ in range(PASSES if gravity > 0.0 else 0):
+        for i in range(m):
+            _fill_equivalent_force(swivel_at(cables, i, gravity), rows, i)
+        for i in range(m):
+            swivel = swivel_at(cables, i, gravity)
+            at = exit_of(swivel, rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
+            _store(at, rows[g.LENGTH, i] - (at.wrapped + at.dead), rows, i)
+        left = 0.0
+        for i in range(m):
+            _correct(swivel_at(cables, i, gravity), rows, i)
+            left = max(left, rows[g.LEFT, i])
+        if left <= CLOSED:
+            break
+    for i in range(m):
+        if not rows[g.LEFT, i] <= MISSED:
+            _solve_by_newton(model, cables, rows, i)
+        _fill_chord(swivel_at(cables, i, gravity), rows, i)
+
+
+@formula
+def _fill_tangent(swivel: Swivel, rows: Array, i: int) -> None:
+    """Fill the platform end relative to the anchor, and the length between tangent and drum, of cable `i`."""
+    x, y, z = rows[g.SPAN, i] * rows[g.AZIMUTH_X, i], rows[g.SPAN, i] * rows[g.AZIMUTH_Y, i], rows[g.RISE, i]
+    chord, nx, ny, nz = rows[g.CHORD, i], swivel.x, swivel.y, swivel.z
+    along = x * nx + y * ny + z * nz
+    rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
+    across = math.sqrt(rx * rx + ry * ry + rz * rz)
+    inverse = swivel.radius / chord
+    out, up = inverse * (chord - along) / (across + TINY), inverse * across
+    rows[g.END_AT_X, i], rows[g.END_AT_Y, i] = x + out * rx + up * nx, y + out * ry + up * ny
+    rows[g.END_AT_Z, i] = z + out * rz + up * nz
+    rows[g.TO_DRUM, i] = swivel.dead + swivel.radius * angle(across + TINY, along)
+    rows[g.LEFT, i] = rows[g.MISS, i] = math.inf
+    if math.isnan(rows[g.PARAMETER, i]) or math.isnan(rows[g.AWAY_X, i] + rows[g.AWAY_Y, i] + rows[g.AWAY_Z, i]):
+        rows[g.AWAY_X, i] = rows[g.AWAY_Y, i] = rows[g.AWAY_Z, i] = 0.0
+
+
+@kernel
+def _solve_by_newton(model: Model, cables: Array, rows: Array, i: int) -> None:
+    """Fill force and exit of cable `i` by damped Newton steps from the straight cable, and its status."""
+    gravity = model.gravity if model.code == codes.CATENARY else 0.0
+    swivel = swivel_at(cables, i, gravity)
+    length, behind, end = (
+        rows[g.LENGTH, i],
+        rows[g.TO_DRUM, i],
+        (rows[g.END_AT_X, i], rows[g.END_AT_Y, i], rows[g.END_AT_Z, i]),
     )
+    cx, cy = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
+    free = max(length - behind, SHORTEST * length)
+    soft = Material(cables[i, tables.DENSITY], swivel.stiffness / (1.0 + behind / free))
+    force, _status = from_length(Model(model.code, 0.0, 0.0, gravity), rows[g.SPAN, i], rows[g.RISE, i], soft, free)
+    x, y, z = force.horizontal * cx, force.horizontal * cy, force.vertical
+    miss, taut = 0.0, force.tension > 0.0 or swivel.weight > 0.0
+    if taut:
+        x, y, z, free, miss = _force_at(swivel, end, length, (x, y, z, free), rows, i)
+    at = exit_of(swivel, x, y, z - swivel.weight * free)
+    if not taut:  # a slack cable without weight leaves its pulley along the tangent
+        at = exit_of(swivel, rows[g.SPAN, i] * cx, rows[g.SPAN, i] * cy, rows[g.RISE, i])
+        free = length - (at.wrapped + at.dead)
+    rows[g.PARAMETER, i] = math.nan
+    _store(at, free, rows, i)
+    give = _give(math.sqrt(x * x + y * y), z, free, swivel.weight, swivel.stiffness)[0]
+    rows[g.TENSION, i] = 1.0 / give if taut else 0.0  # becomes the chord tension with the chord
+    rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] = x, y, z
+    rows[g.LEFT, i] = miss
+
+
+@formula
+def _give(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> tuple[float, float]:
+    """Span of a free span per horizontal force, and rise per mean vertical force [m/N]."""
+    vertical_a = vertical - weight * length
+    square = horizontal * horizontal
+    tension_a, tension_b = math.sqrt(square + vertical_a * vertical_a), math.sqrt(square + vertical * vertical)
+    total = tension_a + tension_b
+    turn = 2.0 / (total + TINY)
+    u = weight * length * (0.5 * turn)
+    if u <= 0.5:
+        series = 1.0 + atanhc_excess(u)
+    else:
+        series = slack_series(horizontal, vertical_a, vertical, tension_a, tension_b)
+    return length * (1.0 / stiffness + turn * series), length * (1.0 / stiffness + turn)
+
+
+@formula
+def _store(at: Exit, free: float, rows: Array, i: int) -> None:
+    """Store the exit of cable `i`, and its free length [m]."""
+    rows[g.CENTER_X, i], rows[g.CENTER_Y, i], rows[g.CENTER_Z, i] = at.rx, at.ry, at.rz
+    rows[g.WRAP, i], rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i] = at.wrap, at.sine, at.cosine
+    rows[g.WRAPPED, i], rows[g.FREE_LENGTH, i] = at.wrapped, free
+
+
+@formula
+def _stored(swivel: Swivel, rows: Array, i: int) -> Exit:
+    """Exit of cable `i`, from `_store`."""
+    rx, ry, rz = rows[g.CENTER_X, i], rows[g.CENTER_Y, i], rows[g.CENTER_Z, i]
+    nx, ny, nz = swivel.x, swivel.y, swivel.z
+    wrapped = rows[g.WRAPPED, i]
+    dead = rows[g.LENGTH, i] - rows[g.FREE_LENGTH, i] - wrapped
+    return Exit(
+        rx, ry, rz, ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx,
+        rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i], rows[g.WRAP, i], wrapped, dead,
+    )  # fmt: skip
 
 
 @formula
@@ -463,46 +527,41 @@ def _product(rows: Array, i: int, a: int, b: int, c: int, vector: Vector) -> flo
 
 
 @formula
-def _fill_rows(swivel: Swivel, end: Vector, free: float, rows: Array, i: int) -> None:
-    """Fill plane, free span, exit and force of cable `i` from its force in world axes. `end`: from the anchor [m]."""
+def _fill_chord(swivel: Swivel, rows: Array, i: int) -> None:
+    """Fill plane, free span and tensions of cable `i` from its exit and its force, and its status."""
     x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
-    down = z - swivel.weight * free
-    leaving, horizontal = math.sqrt(x * x + y * y + down * down), math.sqrt(x * x + y * y)
+    down = z - swivel.weight * rows[g.FREE_LENGTH, i]
+    square = x * x + y * y
+    horizontal = math.sqrt(square)
     cx, cy = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
-    # a slack cable without weight leaves its pulley along the tangent
-    at = exit_of(swivel, x, y, down)
-    if leaving == 0.0:
-        at = exit_of(swivel, rows[g.SPAN, i] * cx, rows[g.SPAN, i] * cy, rows[g.RISE, i])
-        rows[g.FREE_LENGTH, i] = rows[g.LENGTH, i] - (at.wrapped + at.dead)
     if horizontal > 0.0:
-        cx, cy = x / horizontal, y / horizontal
-    px, py, pz = point_of(swivel, at)
-    span, rise = cx * (end[0] - px) + cy * (end[1] - py), end[2] - pz
+        inverse = 1.0 / horizontal
+        cx, cy = x * inverse, y * inverse
+    px, py, pz = point_of(swivel, _stored(swivel, rows, i))
+    span, rise = cx * (rows[g.END_AT_X, i] - px) + cy * (rows[g.END_AT_Y, i] - py), rows[g.END_AT_Z, i] - pz
     chord = math.sqrt(span * span + rise * rise)
-    tension = 0.0
-    if leaving > 0.0:
-        tension = chord / free_compliance(horizontal, z, free, swivel.weight, swivel.stiffness)[3]
+    inverse = 1.0 / chord
     rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i] = cx, cy
     rows[g.SPAN, i], rows[g.RISE, i], rows[g.CHORD, i] = span, rise, chord
-    rows[g.SINE, i], rows[g.COSINE, i] = rise / chord, span / chord
-    rows[g.FREE_SPAN, i], rows[g.FREE_RISE, i], rows[g.FREE_LENGTH, i] = span, rise, free
-    rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], rows[g.TENSION, i] = horizontal, z, tension
-    rows[g.WRAP, i], rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i] = at.wrap, at.sine, at.cosine
-    rows[g.LEAVING, i], rows[g.WRAPPED, i] = leaving, at.wrapped
+    rows[g.SINE, i], rows[g.COSINE, i] = rise * inverse, span * inverse
+    rows[g.FREE_SPAN, i], rows[g.FREE_RISE, i] = span, rise
+    rows[g.HORIZONTAL, i], rows[g.VERTICAL, i] = horizontal, z
+    rows[g.TENSION, i] *= chord
+    rows[g.LEAVING, i] = math.sqrt(square + down * down)
+    rows[g.STATUS, i] = codes.CABLE_SOLVED if rows[g.LEFT, i] <= MISSED else codes.CABLE_NOT_CONVERGED
 
 
 @kernel
 def stiffness_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> None:
     """Fill stiffness and dT/dL of cable `i` in world axes, after `solve_swivel`. Zero for a cable without force."""
-    for k in range(6):
-        rows[g.W_XX + k, i] = 0.0
-    rows[g.LONGER_X, i] = rows[g.LONGER_Y, i] = rows[g.LONGER_Z, i] = 0.0
     if rows[g.LEAVING, i] > 0.0:
         swivel = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
-        free = rows[g.FREE_LENGTH, i]
-        x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
-        fill_compliance(swivel, exit_of(swivel, x, y, z - swivel.weight * free), (x, y, z), free, rows, i)
-        fill_stiffness(rows, i)
+        force = (rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
+        fill_stiffness(swivel, _stored(swivel, rows, i), force, rows[g.FREE_LENGTH, i], rows, i)
+    else:
+        for k in range(6):
+            rows[g.W_XX + k, i] = 0.0
+        rows[g.LONGER_X, i] = rows[g.LONGER_Y, i] = rows[g.LONGER_Z, i] = 0.0
 
 
 @formula
@@ -565,7 +624,7 @@ def energy_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> float:
     free, radius = rows[g.FREE_LENGTH, i], swivel.radius
     x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] - swivel.weight * free
     tension = math.sqrt(x * x + y * y + z * z)
-    at = exit_of(swivel, x, y, z)
+    at = _stored(swivel, rows, i)
     zeta, integral = _height(swivel, at.rz, at.sine, at.cosine, at.wrap)
     strained, entering, drawn = _strains(swivel, tension, zeta)
     whole = tension + 0.5 * tension * tension / swivel.stiffness - swivel.weight * radius * zeta  # H
