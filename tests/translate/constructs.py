@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sagline.kernels.jit import independent
+
 TABLE = np.array([[0.5, -1.5, 2.5], [3.0, 4.0, 5.0]])
 SCALE = 3
 
@@ -90,6 +92,8 @@ def loops(x: float, y: float, i: int, j: int, out: Any) -> None:
         count += 1
         total += 3
     out[3] = total + count
+    for k in independent(4, 8):
+        out[k] = k * x
     for d in (2, 1):
         out[3 + d] = d * y
     for value in out[:3]:

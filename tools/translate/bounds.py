@@ -28,6 +28,7 @@ from tools.translate.extents import (
     joined,
     widened,
 )
+from tools.translate.names import RANGES
 from tools.translate.operations import Values
 from tools.translate.program import definition
 
@@ -141,7 +142,7 @@ class _Body(Values):
 
     def range_of(self, node: ast.expr) -> tuple[Value, Polynomial | None]:
         """Values of the variable of a loop, and the largest number of its passes; None if it is not known."""
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "range":
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in RANGES:
             numbers = [self.value(each) for each in node.args]
             assert all(isinstance(each, Int) for each in numbers)
             ends: list[Any] = numbers if len(numbers) > 1 else [exactly(0), *numbers]

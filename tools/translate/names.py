@@ -6,6 +6,9 @@ import ast
 from collections import Counter
 from collections.abc import Iterable
 from functools import cache
+from typing import Final
+
+RANGES: Final = ("range", "independent")  # names of range in kernels
 
 
 @cache
@@ -57,4 +60,4 @@ def own_loops(function: ast.FunctionDef) -> frozenset[ast.For]:
 
 def _over_range(loop: ast.For) -> bool:
     """True if a loop runs over range."""
-    return isinstance(loop.iter, ast.Call) and isinstance(loop.iter.func, ast.Name) and loop.iter.func.id == "range"
+    return isinstance(loop.iter, ast.Call) and isinstance(loop.iter.func, ast.Name) and loop.iter.func.id in RANGES

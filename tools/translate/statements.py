@@ -348,6 +348,8 @@ class Statements(Calls):
         index = identifier(name) if name else self.temporary()
         sign = "<" if step > 0 else ">"
         next_ = f"{index}++" if step == 1 else f"{index}--" if step == -1 else f"{index} += {step}"
+        if ast.unparse(call.func) == "independent":
+            self.emit("SL_INDEPENDENT")
         self.emit(f"for (int64_t {index} = {start.text}; {index} {sign} {end.within(10)}; {next_}) {{")
         if name:
             self.types[name] = Scalar.INT

@@ -47,6 +47,15 @@ _HEAD: Final = """\
 #define SL_HELPER static inline
 #endif
 
+/* the passes of the next loop have no effect on each other */
+#if defined __clang__
+#define SL_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#elif defined __GNUC__
+#define SL_INDEPENDENT _Pragma("GCC ivdep")
+#else
+#define SL_INDEPENDENT
+#endif
+
 #ifdef SL_CHECK
 #include <stdio.h>
 SL_HELPER int64_t sl_checked(int64_t index, int64_t size, const char *function, int line) {

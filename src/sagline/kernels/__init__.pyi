@@ -12,5 +12,6 @@ from .forward.forward import forward_poses as forward_poses
 from .forward.sensitivity import stabilities_of_poses as stabilities_of_poses
 from .inverse.feasibility import decide_poses as decide_poses
 from .inverse.poses import inverse_poses as inverse_poses
+from .inverse.slanted import inverse_poses_of_slanted as inverse_poses_of_slanted
 from .inverse.underconstrained import underconstrained_poses as underconstrained_poses
 from .statics import structure_matrices as structure_matrices

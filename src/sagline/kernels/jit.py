@@ -18,6 +18,8 @@ from sagline.kernels.sources import say_once
 
 F = TypeVar("F", bound=Callable[..., object])
 
+independent = range  # for loops whose passes have no effect on each other; the C compiler may combine several passes
+
 VARIABLE: Final = "SAGLINE_BACKEND"
 BACKENDS: Final = ("c", "numba", "python")
 INSTALL: Final = "Install sagline again where a C compiler is available, or install numba."

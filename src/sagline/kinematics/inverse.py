@@ -128,7 +128,9 @@ def inverse(
     if options is not None:
         reference = _reference(shared, previous, tension.variable)
 
-    def solve(terms: RobotTerms, which: Indices | None = None, repeated: bool = False) -> tuple[InverseRows, Array]:
+    def solve(
+        terms: RobotTerms, which: Indices | None = None, repeated: bool = False, swivels: Array | None = None
+    ) -> tuple[InverseRows, Array]:
         """Results of the poses `which` for the robot arrays `terms`, and rows of the found poses."""
         at, report = slice(None) if which is None else which, None if repeated else progress
         some, acting = locked(rows[at]), locked(loads[at] if len(loads) > 1 else loads)
@@ -136,7 +138,7 @@ def inverse(
             asked = values, number(level, "level", "N"), path is not None, proves, report
             return inverse_rows.solve_underconstrained_rows(robots, model, some, acting, *asked, terms)
         found = inverse_rows.solve_inverse_rows(
-            robots, method, options, some, acting, reference.copy(), proves, report, terms
+            robots, method, options, some, acting, reference.copy(), proves, report, terms, swivels
         )
         inverse_rows.decide_rows(terms, options, some, acting, found, report)
         return found, some

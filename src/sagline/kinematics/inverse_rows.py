@@ -16,6 +16,7 @@ from sagline.kernels import (
     codes,
     decide_poses,
     inverse_poses,
+    inverse_poses_of_slanted,
     stabilities_of_poses,
     tables,
     underconstrained_poses,
@@ -113,21 +114,26 @@ def solve_inverse_rows(
     stability: bool = False,
     progress: Progress | None = None,
     terms: RobotTerms | None = None,
+    swivels: Array | None = None,
 ) -> InverseRows:
     """Run the kernel over pose rows (N, POSE_COLUMNS). `loads`: external plus inertial wrenches, (1 or N, 6)."""
     # reference: initial tensions of `Closest`, in its variable, or NaN: (m,) for the first pose, (N, m) for each pose
     # independently; stability: True to mark solved poses without a proof of stability as UNPROVED_STABILITY; progress:
     # called after each block with the number of finished poses (undecided poses do not count) and the number of all
-    # poses; terms: from `robot_terms`, if they are not those of `robot`
+    # poses; terms: from `robot_terms`, if they are not those of `robot`; swivels: cable_table with swivel axes, if
+    # terms are those of cables from eyelets, whose frame anchors are replaced by the exit points found
     found, last = InverseRows.empty(robot, len(rows)), np.array(np.atleast_2d(reference)[0])
     memory, otherwise = memory_for(last.size), None if takes_default_kernel(method) else True
     terms = robot_terms(robot) if terms is None else terms
-    given = (*options, terms, rows, loads, last, memory, otherwise, stability, found.answers)
+    given = (rows, loads, last, memory)
     done = 0
     for part in blocks(len(rows), BLOCK if reference.ndim == 1 else 1):
         if reference.ndim > 1:
             last[:] = reference[part.start]
-        inverse_poses(*given, part.start, part.stop)
+        if swivels is None:
+            inverse_poses(*options, terms, *given, otherwise, stability, found.answers, part.start, part.stop)
+        else:
+            inverse_poses_of_slanted(*options, terms, swivels, *given, found.answers, part.start, part.stop)
         if progress is not None:
             done += int(np.count_nonzero(~np.isin(found.pose_status[part], UNDECIDED)))
             progress(done, len(rows))

@@ -1,9 +1,9 @@
 """Inverse kinematics of robots whose pulleys swivel about axes of any direction; docs/model.md, section 10.
 
-The kernels of the inverse kinematics know vertical swivel axes only. The cables are therefore solved as cables that
-start at eyelets at their exit points. The tensions found determine new exit points, at which the next pass starts. A
-pass leaves about (R/D)(wL/T)^2 of the error. Poses without tensions within their limits are first solved with wider
-limits, because exit points of straight cables can make a pose near its limits infeasible.
+The cables are solved as cables that start at eyelets at their exit points. The tensions found determine new exit
+points, at which the next pass starts. The kernel repeats the passes of poses with tensions; a pass leaves about
+(R/D)(wL/T)^2 of the error. Poses without tensions within their limits are first solved with wider limits, because exit
+points of straight cables can make a pose near its limits infeasible.
 """
 
 from __future__ import annotations
@@ -26,17 +26,15 @@ from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing
 if TYPE_CHECKING:
     from sagline.kernels.inverse.poses import Robots as RobotTerms
 
-    # robot arrays, poses, and True for a repeated pass, without reports of its progress
-    Solve = Callable[[RobotTerms, Indices, bool], tuple[InverseRows, Array]]
+    # robot arrays, poses, True for a repeated pass, without reports of its progress, and cable_table with swivel axes
+    Solve = Callable[[RobotTerms, Indices, bool, Array], tuple[InverseRows, Array]]
 
 PASSES: Final = 30  # of the inverse kinematics; three or four are usual
-EXITS: Final = 60  # passes for the exit points at fixed chord tensions
-SAME: Final = 1e-14  # change of an exit point at convergence, relative to the free span
+SAME: Final = 1e-13  # change of an exit point at convergence, relative to the free span
 CLOSE: Final = 1e-12  # largest accepted change after the last pass
 WIDEST, NARROWEST = 0.9, 1e-9  # widening of limits, share of the limits
 # statuses of poses that may be feasible at other exit points
 SHORT: Final = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED, codes.POSE_NOT_COVERED, codes.POSE_BORDERLINE)
-_TINY: Final = 1e-300
 
 
 class _Pass(NamedTuple):
@@ -73,13 +71,14 @@ def solve_slanted_axes(
         eyelets[..., tables.ENTRY] = 1.0
         eyelets[..., tables.TENSION_MIN] *= 1.0 - np.reshape(wider, (-1, 1))
         eyelets[..., tables.TENSION_MAX] *= 1.0 + np.reshape(wider, (-1, 1))
-        found, rows = solve((freedom, locked(body), locked(eyelets)), which, repeated)
+        found, rows = solve((freedom, locked(body), eyelets), which, repeated, locked(own))
         reached = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
-        ends = _ends(own, reached.position, reached.matrix)
-        tension = found.results[tables.TENSION]
-        numbers = _exits(robots_at(robot, which), model, own, body, ends, exits, tension)
-        moved = np.where(np.isfinite(tension), np.abs(numbers[..., :3] - exits).max(axis=-1), 0.0)
-        return _Pass(found, rows, ends - exits, numbers, moved / np.linalg.norm(ends - exits, axis=-1))
+        exits = np.ascontiguousarray(eyelets[..., : tables.PLATFORM_X])
+        chord = _ends(own, reached.position, reached.matrix) - exits
+        size = np.linalg.norm(chord, axis=-1)
+        numbers = _next_exits(robots_at(robot, which), model, own, body, exits, chord, size, found.results)
+        moved = np.abs(numbers[..., :3] - exits).max(axis=-1) / size
+        return _Pass(found, rows, chord, numbers, np.nan_to_num(moved))
 
     chord = _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
     exits = _ends(table, pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3)) - chord
@@ -141,35 +140,26 @@ def _world(cosine: Array, sine: Array, level: Array, up: Array) -> Array:
     return np.stack((level * cosine, level * sine, up), axis=-1)
 
 
-def _exits(
-    robot: Robots, model: CableModel, table: Array, bodies: Array, ends: Array, exits: Array, tension: Array
+def _next_exits(
+    robot: Robots,
+    model: CableModel,
+    table: Array,
+    bodies: Array,
+    exits: Array,
+    chord: Array,
+    size: Array,
+    results: Array,
 ) -> Array:
-    """Exit points of cables at chord tensions (N, m), found by repeated substitution; columns of `exits_of_forces`."""
-    gravity = first_of(robot).gravity
-    cable, weightless = cables_of(robot), model.code == codes.ELASTIC
-    weight = 0.0 if weightless else cable.linear_density * gravity
+    """Columns of `exits_of_forces` at the forces found; NaN without a force. `chord` (N, m, 3), `size` (N, m) [m]."""
+    weightless = model.code == codes.ELASTIC
+    weight = 0.0 if weightless else cables_of(robot).linear_density * first_of(robot).gravity
+    force = np.empty(chord.shape)
+    horizontal = results[tables.HORIZONTAL] / np.maximum(np.hypot(chord[..., 0], chord[..., 1]), 1e-300)
+    force[..., :2] = horizontal[..., None] * chord[..., :2]
+    force[..., 2] = results[tables.VERTICAL] - weight * results[tables.LENGTH]
+    numbers = np.empty((*size.shape, 6))
     acting = bodies[:, tables.GRAVITY] * (0.0 if weightless else 1.0)
-    numbers, kept = np.empty((*tension.shape, 6)), None
-    for _ in range(EXITS):
-        chord = ends - exits
-        span = np.hypot(chord[..., 0], chord[..., 1])
-        held = np.where(np.isfinite(tension), tension, 1.0)
-        state = model.from_tension(cable, span, chord[..., 2], held, gravity)
-        level = chord[..., :2] / np.maximum(span, _TINY)[..., None]
-        vertical = state.vertical_force - weight * state.unstrained_length
-        force = _world(level[..., 0], level[..., 1], state.horizontal_tension, vertical)
-        exits_of_forces(table, locked(acting), locked(force), numbers)
-        new = numbers[..., :3].copy()
-        missed = new - exits
-        if not (np.abs(missed).max(axis=-1) > SAME * np.linalg.norm(chord, axis=-1)).any():
-            break
-        share: Array | float = 0.0
-        if kept is not None:  # Anderson mixing with the last pass, for each cable
-            change = missed - kept[1]
-            share = ((missed * change).sum(axis=-1) / np.maximum((change * change).sum(axis=-1), _TINY))[..., None]
-        exits = new if kept is None else new - share * (new - kept[0])
-        kept = new, missed
-    numbers[~np.isfinite(tension)] = np.nan
+    exits_of_forces(table, locked(acting), force, exits, size, numbers)
     return numbers
 
 

@@ -136,9 +136,9 @@ LEAVING, TOTAL = LENGTH + 27, LENGTH + 28  # tension T_A at the exit point, and 
 BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # length between chord and drum; end of the free span [m]
 ACROSS = LENGTH + 32  # stiffness normal to the plane [N/m]
 # Swivel axes of any direction: platform end relative to the frame anchor [m]; length between tangent and drum [m];
-# errors of the platform end in the last pass and after it, relative to the length
+# errors of the platform end in the last pass and after it, relative to the length; atanh(u)/u of the free span
 END_AT_X, END_AT_Y, END_AT_Z = LENGTH + 33, LENGTH + 34, LENGTH + 35
-TO_DRUM, MISS, LEFT = LENGTH + 36, LENGTH + 37, LENGTH + 38
+TO_DRUM, MISS, LEFT, SERIES = LENGTH + 36, LENGTH + 37, LENGTH + 38, ACROSS
 CABLE_ROWS = LENGTH + 39
 # Cables with a swivel axis of any direction use rows of the passes, which they do not need, for numbers in world axes:
 # stiffness [N/m]; dT/dL [N/m]; force at the platform end [N]; correction of the tangent, as in the OFF rows [m]; unit

@@ -18,7 +18,14 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.functions import angle, atanhc_excess, cosh_polynomial, sinhc_polynomial
+from sagline.kernels.algebra.functions import (
+    EXCESS_LIMIT,
+    angle,
+    atanhc_excess,
+    atanhc_excess_polynomial,
+    cosh_polynomial,
+    sinhc_polynomial,
+)
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.models import (
     CLOSE,
@@ -33,7 +40,7 @@ from sagline.kernels.cable.models import (
 )
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Material, Model
-from sagline.kernels.jit import entry, formula, glue, kernel
+from sagline.kernels.jit import entry, formula, glue, independent, kernel
 
 Vector = tuple[float, float, float]
 
@@ -124,34 +131,26 @@ def exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
     square = rx * rx + ry * ry + rz * rz
     across = math.sqrt(square)
     tension = math.sqrt(square + along * along)
-    if not across > 0.0:  # along the axis: any direction normal to the axis
-        rx, ry, rz = (1.0 - nx * nx, -nx * ny, -nx * nz) if abs(nx) < 0.8 else (-nx * ny, 1.0 - ny * ny, -ny * nz)
-    inverse = 1.0 / (across if across > 0.0 else math.sqrt(rx * rx + ry * ry + rz * rz))
+    inverse = 1.0 / (across + TINY)  # for a force along the axis, e_r is zero
     rx, ry, rz = rx * inverse, ry * inverse, rz * inverse
     sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
     strained = 1.0 + tension / swivel.stiffness
-    weight = swivel.weight * radius / strained
     inverse = 1.0 / (tension + TINY)
-    first = angle(across, along)
-    sine, cosine, wrap = across * inverse, along * inverse, first
-    if weight > 0.0:
-        straight_sine, straight_cosine = sine, cosine
-        c, s = 1.0, 0.0  # of the turn about the axis
-        for _ in range(2):
-            moment = weight * (wrap - sine)
-            slope = (1.0 - cosine) * across - moment * rz
-            turn = -moment * sz / slope if slope > 0.0 else 0.0
-            turn = min(max(turn, -0.5), 0.5)
-            c = 1.0 / math.sqrt(1.0 + turn * turn)
-            s = turn * c
-            outward = across * c
-            inverse = 1.0 / (math.sqrt(outward * outward + along * along) + TINY)
-            sine, cosine = outward * inverse, along * inverse
-            less = straight_sine * cosine - straight_cosine * sine  # sine of the decrease of the wrap angle
-            square = less * less
-            wrap = first - less * (1.0 + square * (1.0 / 6.0 + square * 0.075))
-        rx, ry, rz = c * rx + s * sx, c * ry + s * sy, c * rz + s * sz
-        sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
+    first, straight_sine, straight_cosine = angle(across + TINY, along), across * inverse, along * inverse
+    moment = swivel.weight * radius / strained * (first - straight_sine)
+    slope = (1.0 - straight_cosine) * across - moment * rz
+    turn = -moment * sz / slope if slope > 0.0 else 0.0
+    turn = min(max(turn, -0.5), 0.5)
+    c = 1.0 / math.sqrt(1.0 + turn * turn)
+    s = turn * c
+    outward = across * c
+    inverse = 1.0 / (math.sqrt(outward * outward + along * along) + TINY)
+    sine, cosine = outward * inverse, along * inverse
+    less = straight_sine * cosine - straight_cosine * sine  # sine of the decrease of the wrap angle
+    square = less * less
+    wrap = first - less * (1.0 + square * (1.0 / 6.0 + square * 0.075))
+    rx, ry, rz = c * rx + s * sx, c * ry + s * sy, c * rz + s * sz
+    sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
     zeta, integral = _height(swivel, rz, sine, cosine, wrap)
     _strained, entering, drawn = _strains(swivel, tension, zeta)
     inverse = 1.0 / strained
@@ -331,38 +330,48 @@ def _force_at(
 
 
 @formula
-def _fill_equivalent_force(swivel: Swivel, rows: Array, i: int) -> None:
-    """Fill the force at the exit point of the equivalent cable `i`, which has no pulley, and its parameter h."""
+def _equivalent(swivel: Swivel, rows: Array, i: int) -> tuple[Vector, float, float]:
+    """Chord (x, y, z), length and EA of the equivalent cable `i`, which has no pulley."""
     length, behind = rows[g.LENGTH, i], rows[g.TO_DRUM, i]
     asked = max(length - behind, SHORTEST * length)
-    soft = swivel.stiffness / (1.0 + behind / asked)
     x = rows[g.SPAN, i] * rows[g.AZIMUTH_X, i] + rows[g.AWAY_X, i]
     y = rows[g.SPAN, i] * rows[g.AZIMUTH_Y, i] + rows[g.AWAY_Y, i]
+    z = rows[g.RISE, i] + (behind * (0.5 * swivel.weight) * asked / swivel.stiffness + rows[g.AWAY_Z, i])
+    return (x, y, z), asked, swivel.stiffness / (1.0 + behind / asked)
+
+
+@formula
+def _fill_equivalent_force(swivel: Swivel, rows: Array, i: int) -> None:
+    """Fill the force at the exit point of the equivalent cable `i`, which has no pulley, and its parameter h."""
+    (x, y, z), asked, soft = _equivalent(swivel, rows, i)
     half = 0.5 * swivel.weight
-    z = rows[g.RISE, i] + (behind * half * asked / swivel.stiffness + rows[g.AWAY_Z, i])
     square = x * x + y * y
     span = math.sqrt(square)
     kappa, excess = half * asked / soft, relative_excess(span, z, asked)
     inverse = 1.0 / asked
     xi2, zeta2 = square * inverse * inverse, z * z * inverse * inverse
-    last = rows[g.PARAMETER, i]
-    h = halley_step(last, xi2, zeta2, kappa, excess)
-    near = abs(h - last) <= CLOSE * (h + kappa) and 0.0 < h < ORDINARY
-    if near and abs(h - last) > SMALL_HALLEY_STEP * (h + kappa):
-        last = h
-        h = halley_step(last, xi2, zeta2, kappa, excess)
-        near = abs(h - last) <= SMALL_HALLEY_STEP * (h + kappa) and 0.0 < h < ORDINARY
-    if near:
-        share, y2 = half / (h + kappa), h * h
-        tangent = h * sinhc_polynomial(y2) / cosh_polynomial(y2)
-        vertical = half * (asked + z / (tangent + kappa))
-    else:
-        force, _status = catenary_from_length(span, z, asked, swivel.weight, soft)
-        h = half * math.sqrt(square + z * z) / force.tension - kappa if force.tension > 0.0 else math.nan
-        share, vertical = force.horizontal / span if span > 0.0 else 0.0, force.vertical
-    rows[g.PARAMETER, i] = h
+    first = halley_step(rows[g.PARAMETER, i], xi2, zeta2, kappa, excess)
+    h = halley_step(first, xi2, zeta2, kappa, excess)
+    near = abs(first - rows[g.PARAMETER, i]) <= CLOSE * (first + kappa) and 0.0 < h < ORDINARY
+    near = near and abs(h - first) <= SMALL_HALLEY_STEP * (h + kappa)
+    share, y2 = half / (h + kappa), h * h
+    tangent = h * sinhc_polynomial(y2) / cosh_polynomial(y2)
+    rows[g.PARAMETER, i] = h if near else math.nan
     rows[g.FORCE_X, i], rows[g.FORCE_Y, i] = share * x, share * y
-    rows[g.FORCE_Z, i] = vertical - swivel.weight * asked
+    rows[g.FORCE_Z, i] = half * (z / (tangent + kappa) - asked)
+
+
+@kernel
+def _fill_any_equivalent_force(swivel: Swivel, rows: Array, i: int) -> None:
+    """`_fill_equivalent_force` for any sag, without a previous parameter."""
+    (x, y, z), asked, soft = _equivalent(swivel, rows, i)
+    span, half = math.sqrt(x * x + y * y), 0.5 * swivel.weight
+    force, _status = catenary_from_length(span, z, asked, swivel.weight, soft)
+    chord = math.sqrt(span * span + z * z)
+    rows[g.PARAMETER, i] = half * (chord / force.tension - asked / soft) if force.tension > 0.0 else math.nan
+    share = force.horizontal / span if span > 0.0 else 0.0
+    rows[g.FORCE_X, i], rows[g.FORCE_Y, i] = share * x, share * y
+    rows[g.FORCE_Z, i] = force.vertical - swivel.weight * asked
 
 
 @formula
@@ -373,7 +382,9 @@ def _correct(swivel: Swivel, rows: Array, i: int) -> None:
     x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
     tension = math.sqrt(x * x + y * y + z * z)
     z += swivel.weight * free
-    give, lift = _give(math.sqrt(x * x + y * y), z, free, swivel.weight, swivel.stiffness)
+    turn = 2.0 / (tension + math.sqrt(x * x + y * y + z * z) + TINY)
+    give = free * (1.0 / swivel.stiffness + turn * rows[g.SERIES, i])
+    lift = free * (1.0 / swivel.stiffness + turn)
     px, py, pz = point_of(swivel, at)
     ux, uy, uz = rows[g.END_AT_X, i] - px, rows[g.END_AT_Y, i] - py, rows[g.END_AT_Z, i] - pz
     ex, ey, ez = ux - give * x, uy - give * y, uz - lift * (z - 0.5 * swivel.weight * free)
@@ -414,25 +425,53 @@ def solve_swivels(model: Model, cables: Array, rows: Array) -> None:
     Cables for which the passes do not converge are solved one by one, by damped Newton steps.
     """
     m, gravity = cables.shape[0], model.gravity if model.code == codes.CATENARY else 0.0
-    for i in range(m):
+    for i in independent(m):
         _fill_tangent(swivel_at(cables, i, gravity), rows, i)
     for _ in range(PASSES if gravity > 0.0 else 0):
-        for i in range(m):
+        for i in independent(m):
             _fill_equivalent_force(swivel_at(cables, i, gravity), rows, i)
         for i in range(m):
+            if math.isnan(rows[g.PARAMETER, i]):
+                _fill_any_equivalent_force(swivel_at(cables, i, gravity), rows, i)
+        for i in independent(m):
             swivel = swivel_at(cables, i, gravity)
             at = exit_of(swivel, rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
             _store(at, rows[g.LENGTH, i] - (at.wrapped + at.dead), rows, i)
+        for i in independent(m):
+            _fill_series(swivel_at(cables, i, gravity), rows, i)
+        for i in range(m):
+            if math.isnan(rows[g.SERIES, i]):
+                _fill_any_series(swivel_at(cables, i, gravity), rows, i)
+        for i in independent(m):
+            _correct(swivel_at(cables, i, gravity), rows, i)
         left = 0.0
         for i in range(m):
-            _correct(swivel_at(cables, i, gravity), rows, i)
             left = max(left, rows[g.LEFT, i])
         if left <= CLOSED:
             break
     for i in range(m):
         if not rows[g.LEFT, i] <= MISSED:
             _solve_by_newton(model, cables, rows, i)
+    for i in independent(m):
         _fill_chord(swivel_at(cables, i, gravity), rows, i)
+
+
+@glue
+def fill_from_results(model: Model, cables: Array, results: Array, p: int, rows: Array) -> None:
+    """Fill lengths, forces and exits of all cables at pose `p` of a plan, after `cable_geometry`."""
+    for i in range(cables.shape[0]):
+        swivel = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+        azimuth, horizontal = results[tables.AZIMUTH, p, i], results[tables.HORIZONTAL, p, i]
+        cosine, sine, z = math.cos(azimuth), math.sin(azimuth), results[tables.VERTICAL, p, i]
+        x, y = horizontal * cosine, horizontal * sine
+        rows[g.LENGTH, i] = results[tables.LENGTH, p, i]
+        free = rows[g.LENGTH, i] - (results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i])
+        down = z - swivel.weight * free
+        _store(exit_of(swivel, x, y, down), free, rows, i)
+        rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] = x, y, z
+        rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i] = cosine, sine
+        rows[g.HORIZONTAL, i], rows[g.VERTICAL, i] = horizontal, z
+        rows[g.LEAVING, i] = math.sqrt(x * x + y * y + down * down)
 
 
 @formula
@@ -477,26 +516,34 @@ def _solve_by_newton(model: Model, cables: Array, rows: Array, i: int) -> None:
         free = length - (at.wrapped + at.dead)
     rows[g.PARAMETER, i] = math.nan
     _store(at, free, rows, i)
-    give = _give(math.sqrt(x * x + y * y), z, free, swivel.weight, swivel.stiffness)[0]
-    rows[g.TENSION, i] = 1.0 / give if taut else 0.0  # becomes the chord tension with the chord
+    give = free_compliance(math.sqrt(x * x + y * y), z, free, swivel.weight, swivel.stiffness)[3] if taut else math.inf
+    rows[g.TENSION, i] = 1.0 / give  # becomes the chord tension with the chord
     rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] = x, y, z
     rows[g.LEFT, i] = miss
 
 
 @formula
-def _give(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> tuple[float, float]:
-    """Span of a free span per horizontal force, and rise per mean vertical force [m/N]."""
-    vertical_a = vertical - weight * length
-    square = horizontal * horizontal
-    tension_a, tension_b = math.sqrt(square + vertical_a * vertical_a), math.sqrt(square + vertical * vertical)
-    total = tension_a + tension_b
-    turn = 2.0 / (total + TINY)
-    u = weight * length * (0.5 * turn)
-    if u <= 0.5:
-        series = 1.0 + atanhc_excess(u)
-    else:
-        series = slack_series(horizontal, vertical_a, vertical, tension_a, tension_b)
-    return length * (1.0 / stiffness + turn * series), length * (1.0 / stiffness + turn)
+def _fill_series(swivel: Swivel, rows: Array, i: int) -> None:
+    """Fill atanh(u)/u of the free span of cable `i`, whose force at the exit point is stored; NaN if u is large."""
+    x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
+    weight = swivel.weight * rows[g.FREE_LENGTH, i]
+    square, above = x * x + y * y, z + weight
+    u = weight / (math.sqrt(square + z * z) + math.sqrt(square + above * above) + TINY)
+    excess = atanhc_excess_polynomial(u * u)
+    rows[g.SERIES, i] = 1.0 + excess if u * u <= EXCESS_LIMIT else math.nan
+
+
+@kernel
+def _fill_any_series(swivel: Swivel, rows: Array, i: int) -> None:
+    """`_fill_series` for any u."""
+    horizontal = math.hypot(rows[g.FORCE_X, i], rows[g.FORCE_Y, i])
+    vertical_a, weight = rows[g.FORCE_Z, i], swivel.weight * rows[g.FREE_LENGTH, i]
+    vertical = vertical_a + weight
+    tension_a, tension_b = math.hypot(horizontal, vertical_a), math.hypot(horizontal, vertical)
+    u = weight / (tension_a + tension_b)
+    sags = u > 0.5
+    series = slack_series(horizontal, vertical_a, vertical, tension_a, tension_b) if sags else 1.0 + atanhc_excess(u)
+    rows[g.SERIES, i] = series
 
 
 @formula
@@ -642,24 +689,45 @@ def energy_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> float:
     )
 
 
+@formula
+def next_exit(swivel: Swivel, robot: Array, i: int, force: Vector, eyelets: Array, chord: float) -> tuple[Vector, Exit]:
+    """Next exit point of cable `i` in world axes [m], from the `force` at the present exit point, a row of `eyelets`.
+
+    A motion of the present exit point turns the force, which moves the exit point of the force back by the share R/D
+    tan(psi/2) normal to the plane of the pulley. The step is shorter by this share. `chord`: D of the free span [m].
+    """
+    at = exit_of(swivel, force[0], force[1], force[2])
+    x, y, z = point_of(swivel, at)
+    x += robot[i, tables.FRAME_X] - eyelets[i, tables.FRAME_X]
+    y += robot[i, tables.FRAME_Y] - eyelets[i, tables.FRAME_Y]
+    z += robot[i, tables.FRAME_Z] - eyelets[i, tables.FRAME_Z]
+    back = swivel.radius * at.sine
+    share = back / (chord * (1.0 + at.cosine) + back) * (x * at.sx + y * at.sy + z * at.sz)
+    return (
+        eyelets[i, tables.FRAME_X] + (x - share * at.sx),
+        eyelets[i, tables.FRAME_Y] + (y - share * at.sy),
+        eyelets[i, tables.FRAME_Z] + (z - share * at.sz),
+    ), at
+
+
 @entry
-def exits_of_forces(robots: Array, gravity: Array, forces: Array, exits: Array) -> None:
-    """Exit points of cables with swivel axes.
+def exits_of_forces(robots: Array, gravity: Array, forces: Array, eyelets: Array, chords: Array, exits: Array) -> None:
+    """Next exit points of cables with swivel axes.
 
     Args:
         robots: cable_table with swivel axes, (1 or N, m, SWIVEL_COLUMNS).
         gravity: Gravity for the weight of the cables [m/s^2], (1 or N,); 0 for cables without weight.
-        forces: Forces at the exit points, toward the platform ends [N], (N, m, 3).
-        exits: Filled with the exit points in world axes [m], the wrap angle [rad], the unstrained length on the pulley
-            and the unstrained dead length [m], (N, m, 6).
+        forces: Forces at the present exit points, toward the platform ends [N], (N, m, 3).
+        eyelets: Present exit points in world axes [m], (N, m, 3).
+        chords: Lengths of the chords of the free spans [m], (N, m).
+        exits: Filled with the next exit points in world axes [m], the wrap angle [rad], the unstrained length on the
+            pulley and the unstrained dead length [m], (N, m, 6).
     """
     for p in range(forces.shape[0]):
         cables = robots[min(p, robots.shape[0] - 1)]
         for i in range(cables.shape[0]):
             swivel = swivel_at(cables, i, gravity[min(p, gravity.shape[0] - 1)])
-            at = exit_of(swivel, forces[p, i, 0], forces[p, i, 1], forces[p, i, 2])
-            x, y, z = point_of(swivel, at)
-            exits[p, i, 0] = cables[i, tables.FRAME_X] + x
-            exits[p, i, 1] = cables[i, tables.FRAME_Y] + y
-            exits[p, i, 2] = cables[i, tables.FRAME_Z] + z
+            force = (forces[p, i, 0], forces[p, i, 1], forces[p, i, 2])
+            (x, y, z), at = next_exit(swivel, cables, i, force, eyelets[p], chords[p, i])
+            exits[p, i, 0], exits[p, i, 1], exits[p, i, 2] = x, y, z
             exits[p, i, 3], exits[p, i, 4], exits[p, i, 5] = at.wrap, at.wrapped, at.dead

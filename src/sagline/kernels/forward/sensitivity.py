@@ -13,7 +13,7 @@ from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
-from sagline.kernels.cable.swivel import TINY, force_slopes_of_swivel, rise_of_exit, swivel_at
+from sagline.kernels.cable.swivel import TINY, fill_from_results, force_slopes_of_swivel, rise_of_exit, swivel_at
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.forward import FLAT
@@ -468,7 +468,11 @@ def stabilities_of_poses(
             continue
         body, cables = f.row_of(bodies, p), f.row_of(tables_of_cables, p)
         model = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
-        _fill_state(model, cables, body, poses[p], results, p, rotation, rows)
+        if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+            cable_geometry(cables, body, poses[p], rotation, rows)
+            fill_from_results(model, cables, results, p, rows)
+        else:
+            _fill_state(model, cables, body, poses[p], results, p, rotation, rows)
         f.platform_stiffness(model, cables, rows, stiffness)
         f.fill_arcs(freedom, cables, body, arcs)
         symmetric_part(arcs, stiffness, matrix)

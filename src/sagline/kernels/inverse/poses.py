@@ -156,7 +156,7 @@ def sag_force_change(cables: Cables) -> float:
 
 
 @glue
-def _store_tensions(
+def store_tensions(
     model: Model,
     distribution: nearest.Distribution,
     cables: Cables,
@@ -264,7 +264,7 @@ def inverse_poses(
         if status == codes.POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
             if distribution.method == codes.CLOSEST:
-                _store_tensions(model, distribution, cables, others, near)
+                store_tensions(model, distribution, cables, others, near)
         else:
             residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
         for k in range(n):

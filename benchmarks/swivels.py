@@ -1,0 +1,74 @@
+"""Pulleys that swivel about any axis, compared with vertical axes: `python -m benchmarks.swivels`.
+
+The times are processor times. The robots are solved in turn, and the table contains the shortest times, so that other
+programs have little effect on the ratios.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+import sagline as sl
+from benchmarks.measure import Row, print_table
+from sagline.core.arrays import Array
+from tests.kinematics.test_slanted import AXES, with_axes
+
+POSES, REPEATS = 2000, 7
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+ROBOTS = {
+    "vertical": with_axes([0.0, 0.0, 1.0]),
+    "any": with_axes(AXES["any"]),
+    "horizontal": with_axes(AXES["tangential"]),
+}
+TARGETS = {
+    "forward, steps of 2 mm": "≤ 1.5 x vertical",
+    "forward, start pose wrong by 35 mm": "≤ 1.5 x vertical",
+    "forward, no start pose": "≤ 1.5 x vertical",
+    "inverse": "≤ 2.5 x vertical",
+    "inverse without stability": "≤ 2.5 x vertical",
+    "stiffness and sensitivities": "",
+}
+
+
+def pose_at(position: Array) -> sl.Pose:
+    """Poses without rotation."""
+    return sl.Pose.from_quaternion(position, np.tile(LEVEL, (len(position), 1)))
+
+
+def calls(robot: sl.Robot) -> dict[str, Callable[[], object]]:
+    """The calls to measure, in the order of the targets."""
+    angle = np.linspace(0.0, 2.0 * np.pi, POSES, endpoint=False)
+    radius = 2e-3 * POSES / (2.0 * np.pi)
+    path = pose_at(np.column_stack((radius * np.cos(angle), radius * np.sin(angle), np.full(POSES, 2.0))))
+    near, plan = pose_at(path.position + 0.02), sl.inverse(robot, path)
+    lengths, state = plan.unstrained_length, plan.state
+    return {
+        "forward, steps of 2 mm": lambda: sl.forward(robot, lengths, path[0]),
+        "forward, start pose wrong by 35 mm": lambda: sl.forward(robot, lengths, near),
+        "forward, no start pose": lambda: sl.forward(robot, lengths[::10]),
+        "inverse": lambda: sl.inverse(robot, path),
+        "inverse without stability": lambda: sl.inverse(robot, path, stability=False),
+        "stiffness and sensitivities": lambda: sl.stiffness(state),
+    }
+
+
+def times() -> Iterator[Row]:
+    """CoGiRo with pulleys of 50 mm radius and 3 m of dead cable."""
+    ready = {name: calls(robot) for name, robot in ROBOTS.items()}
+    for quantity, target in TARGETS.items():
+        best = dict.fromkeys(ROBOTS, np.inf)
+        for _ in range(REPEATS):
+            for name, each in ready.items():
+                start = time.process_time()
+                each[quantity]()
+                best[name] = min(best[name], time.process_time() - start)
+        poses = POSES / 10 if "no start" in quantity else POSES
+        texts = [f"{name} {1e6 * t / poses:.3g} µs ({t / best['vertical']:.2f} x)" for name, t in best.items()]
+        yield Row(quantity, target, "; ".join(texts))
+
+
+if __name__ == "__main__":
+    print_table("Swivel axes, 8 exact cables", [times])
