@@ -56,7 +56,7 @@ def calls(robot: sl.Robot) -> dict[str, Callable[[], object]]:
 
 
 def times() -> Iterator[Row]:
-    """CoGiRo with pulleys of 50 mm radius and 3 m of dead cable."""
+    """CoGiRo with pulleys of 50 mm radius and 3 m of dead length."""
     ready = {name: calls(robot) for name, robot in ROBOTS.items()}
     for quantity, target in TARGETS.items():
         best = dict.fromkeys(ROBOTS, np.inf)

@@ -238,6 +238,33 @@ def test_other_models_friction_and_points_inside_a_pulley_are_refused() -> None:
         sl.inverse(robot, sl.Pose.from_quaternion(inside, LEVEL))
 
 
+def test_a_pulley_without_swivel_keeps_the_plane_of_a_planar_robot() -> None:
+    corners, ends = np.array([[-2.0, 0.0, 2.0], [2.0, 0.0, 2.0]]), np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    radius, stiffness = 0.1, 5e4
+    winches = sl.Winch(radius, swivel_axis=[[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    robot = sl.Robot(
+        "planar",
+        corners,
+        ends,
+        sl.Cable(1e-9, stiffness),
+        mass=20.0,
+        motion_pattern="2T",
+        plane_normal=[0.0, 1.0, 0.0],
+        winches=winches,
+    )
+    place, near = np.array([0.3, 0.0, 0.8]), np.array([0.4, 0.0, 0.9])
+    plan = sl.inverse(robot, sl.Pose.from_quaternion(place, LEVEL))
+    # the center of a fixed pulley is below the horizontal entry; the cable wraps the upper side of the pulley
+    away = np.abs(place + ends - corners)[:, [0, 2]] - [0.0, radius]
+    distance = np.linalg.norm(away, axis=1)
+    tangent = np.sqrt(distance**2 - radius**2)
+    wrap = np.arctan2(away[:, 1], away[:, 0]) + np.arctan2(radius, tangent)
+    length = (tangent + radius * wrap) / (1.0 + plan.chord_tension / stiffness)
+    np.testing.assert_allclose(plan.unstrained_length, length, rtol=1e-9)
+    found = sl.forward(robot, plan.unstrained_length, sl.Pose.from_quaternion(near, LEVEL))
+    np.testing.assert_allclose(found.state.pose.position, place, atol=1e-9)
+
+
 def test_robot_files_keep_axes(tmp_path: Path) -> None:
     robot = four_cables()
     (tmp_path / "four.yaml").write_text(sl.dump_robot(robot))

@@ -20,7 +20,7 @@ from sagline.kernels.tension import nearest
 from sagline.kernels.tension.polygon import new_work_arrays
 
 PASSES = 8  # largest number of passes; three are usual
-SAME_EXIT = 1e-13  # change of an exit point after which its error is a rounding error, relative to the free span
+SAME_EXIT = 2e-12  # change of an exit point after which the next change is a rounding error, relative to the free span
 
 
 @glue
