@@ -125,15 +125,16 @@ def solve_inverse_rows(
     found, last = InverseRows.empty(robot, len(rows)), np.array(np.atleast_2d(reference)[0])
     memory, otherwise = memory_for(last.size), None if takes_default_kernel(method) else True
     terms = robot_terms(robot) if terms is None else terms
-    given = (rows, loads, last, memory)
+    given = (*options, terms, rows, loads, last, memory, otherwise, stability, found.answers)
     done = 0
     for part in blocks(len(rows), BLOCK if reference.ndim == 1 else 1):
         if reference.ndim > 1:
             last[:] = reference[part.start]
         if swivels is None:
-            inverse_poses(*options, terms, *given, otherwise, stability, found.answers, part.start, part.stop)
+            inverse_poses(*given, part.start, part.stop)
         else:
-            inverse_poses_of_slanted(*options, terms, swivels, *given, found.answers, part.start, part.stop)
+            of_slanted = (*options, terms, swivels, rows, loads, last, memory, found.answers)
+            inverse_poses_of_slanted(*of_slanted, part.start, part.stop)
         if progress is not None:
             done += int(np.count_nonzero(~np.isin(found.pose_status[part], UNDECIDED)))
             progress(done, len(rows))
