@@ -1395,6 +1395,10 @@ def _in_time(given: _Given) -> dict[str, Call]:
             lambda length, winches: machine.shift(length, winches), _all(length=("number", 1e-3), winches=("cable", 3))
         ),
         "Simulator.cut": Call(lambda cable: sl.Simulator(driven, driven_state).cut(cable), _all(cable=("cable", 3))),
+        "Simulator.drop": Call(lambda mass: sl.Simulator(driven, driven_state).drop(mass), _all(mass=("number", 1.0))),
+        "Simulator.pick_up": Call(
+            lambda mass: sl.Simulator(driven, driven_state).pick_up(mass), _all(mass=("number", 1.0))
+        ),
         "Simulator.limit_force": Call(
             lambda force, winches: machine.limit_force(force, winches),
             _all(force=("number", 1e3), winches=("cable", 3)),

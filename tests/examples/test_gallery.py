@@ -69,6 +69,13 @@ def test_few_cables(run: Run) -> None:
     assert left["shaped"] == pytest.approx(0.012, abs=0.001)
 
 
+def test_train_policy(run: Run) -> None:
+    distance = run("train_policy")["distance"]
+    np.testing.assert_allclose(np.ptp(distance["without a policy"]), 0.0, atol=1e-6)  # the robots are at rest
+    assert distance["with the policy"][-1] < 0.3 * distance["with the policy"][0]
+    assert Path("train_policy.png").stat().st_size > 10_000
+
+
 def test_control_loop(run: Run) -> None:
     names = run("control_loop")
     assert names["difference"] < 1e-12

@@ -200,6 +200,32 @@ def test_a_cut_agrees_with_a_break_of_simulate(winches: str) -> None:
     assert np.linalg.norm(reading.position - PLACE.position) > 0.02
 
 
+@pytest.mark.parametrize("winches", ["ideal", "robot"])
+def test_masses_agree_with_the_events_of_simulate(winches: Any) -> None:
+    """The platform moves when it drops a mass and picks up another, so that its momentum counts."""
+    state = sl.inverse(prototype(), PLACE).state
+    machine = sl.Simulator(prototype(), state, winches=winches, step=1e-3)
+    rows = [state.unstrained_length - 0.05 * t * t for t in np.linspace(0.0, 0.6, 61)]
+    events: list[Any] = [sl.Drop(2.0, 0.2), sl.PickUp(3.0, 0.4)]
+    run = sl.simulate(
+        state, unstrained_length=(np.linspace(0.0, 0.6, 61), np.array(rows)), step=1e-3, winches=winches, events=events
+    )
+    for i in range(60):
+        if i == 20:
+            machine.drop(2.0)
+        if i == 40:
+            machine.pick_up(3.0)
+        reading = machine.step(rows[i + 1], 0.01)
+    np.testing.assert_allclose(reading.position, run.pose.position[-1], atol=1e-9)
+    np.testing.assert_allclose(reading.twist, run.twist[-1], atol=1e-8)
+    np.testing.assert_allclose(reading.tension, run.tensions[-1], atol=1e-6)
+    assert np.abs(reading.tension - state.cables.frame_end_tension).max() > 5.0
+    with refused("mass", "1e+06 kg", "< 51 kg, the platform's mass"):
+        machine.drop(1e6)
+    with refused("mass", "-1 kg", "> 0 kg, finite"):
+        machine.pick_up(-1.0)
+
+
 def test_a_drive_with_less_force() -> None:
     """It holds up to its friction, then releases the cable; the reading says that it is at its limit."""
     robot = prototype(load_cell_deviation=0.0, load_cell_bias=0.0, load_cell_gain=1.0)

@@ -123,27 +123,33 @@ class Simulator:
         )
         code, kind, remembered, loads, stride = rules
         self._plant, self._kind, m = plant, kind, given.robot.cable_count
-        period = self._set_up_course(given, m)
+        self._period = self._set_up_course(given, m)
         lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
         rules = (code, kind, remembered, loads | LOADED, stride)
         numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
         inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)))
         records = (*Records(0, m).arrays[:-1], np.empty((0, k.NOTE_COLUMNS)))
-        run = (*plant.arguments(rules, numbers, inputs), records, 0, 0)
+        self._settings, self._records = (rules, numbers, inputs), records
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
         places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
         self._encoders = Encoders(given.robot, *places) if Encoders.are_on(given.robot) else None
-        frame = (locked(given.robot.center_of_mass @ plant.axes), plant.turn_back)
         self._platform = np.empty(body.STATE_COLUMNS)
-        look = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
-        self.kernel_arguments: KernelArguments = KernelArguments(period, run, look)
-        self._begin = bound(begin_period, *period, numbers=3)
-        self._run = bound(motion.run_massless, *run, numbers=2)
-        self._look = bound(body.platform_state, *look)
+        self._begin = bound(begin_period, *self._period, numbers=3)
+        self._bind()
         self._reading = self._new_reading()
         self._run(0, 0)
         self._read()
+
+    def _bind(self) -> None:
+        """Bind the kernels to the arrays of the plant. A new mass changes these arrays."""
+        plant = self._plant
+        run = (*plant.arguments(*self._settings), self._records, 0, 0)
+        frame = (locked(plant.robot.center_of_mass @ plant.axes), plant.turn_back)
+        look = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
+        self.kernel_arguments: KernelArguments = KernelArguments(self._period, run, look)
+        self._run = bound(motion.run_massless, *run, numbers=2)
+        self._look = bound(body.platform_state, *look)
 
     def _set_up_course(self, given: InitialConditions, m: int) -> tuple[Any, ...]:
         """Create the time table from the last to the next set points. Returns the arguments of `begin_period`."""
@@ -302,6 +308,37 @@ class Simulator:
             InvalidValueError: If a cable does not exist.
         """
         self._plant.cut(self._chosen(cables, "cables"))
+
+    def drop(self, mass: float) -> None:
+        """Remove a part of the platform's mass. The inertia decreases in proportion; the velocity is unchanged.
+
+        Args:
+            mass: Mass [kg], > 0, less than the present mass of the platform.
+
+        Raises:
+            InvalidValueError: If `mass` is not such a number.
+        """
+        given, present = number(mass, "mass", "kg", above=0.0), float(self._plant.inertia[0])
+        if not given < present:
+            step = "Drop less than the platform's mass."
+            raise InvalidValueError("mass", f"{given:g} kg", f"< {present:g} kg, the platform's mass", step)
+        self._set_mass(present - given, at_rest=False)
+
+    def pick_up(self, mass: float) -> None:
+        """Add a mass at rest to the platform. The inertia increases in proportion; the momentum is unchanged.
+
+        Args:
+            mass: Mass [kg], > 0.
+
+        Raises:
+            InvalidValueError: If `mass` is not a number > 0.
+        """
+        self._set_mass(float(self._plant.inertia[0]) + number(mass, "mass", "kg", above=0.0), at_rest=True)
+
+    def _set_mass(self, mass: float, *, at_rest: bool) -> None:
+        self._plant.with_mass(mass, at_rest=at_rest)
+        self._counters[k.READY] = 0  # compute all forces and energies again
+        self._bind()
 
     def limit_force(self, force: float, *winches: int) -> None:
         """Limit the force of drives, for instance for a hot motor.
