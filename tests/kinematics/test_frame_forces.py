@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from sagline.core.arrays import Array
 from tests.calibration.machines import robots
-from tests.refusal import refused
 from tests.tiers import wide
 
 WRENCH = np.array([20.0, -15.0, 10.0, 8.0, -6.0, 12.0])
@@ -92,9 +91,28 @@ def test_the_envelope_of_a_path() -> None:
     np.testing.assert_array_equal(single.largest, single.pulley)
 
 
-def test_guides_are_refused() -> None:
+@pytest.mark.parametrize("radius", [0.0, 0.05])
+@pytest.mark.parametrize("winding", [0, 1])
+def test_guides_and_drums_carry_the_guided_cables(radius: float, winding: int) -> None:
     robot = sl.load_robot("cogiro")
-    drum = robot.frame_anchors * [2.0, 2.0, 0.0]
-    plan = sl.inverse(robot.replace(winches=sl.Winch(guides=drum[:, None])), (0, 0, 2))
-    with refused("winches: guides", "given"):
-        plan.frame_forces()
+    eyelet, drum = robot.frame_anchors * [2.0, 2.0, 1.0], robot.frame_anchors * [2.0, 2.0, 0.0]
+    winches = sl.Winch(radius, guides=np.stack((drum, eyelet), axis=1), pulley_friction=0.1, drum_radius=0.05)
+    robot = robot.replace(winches=winches)
+    plan = plan_of(robot, sl.Catenary(), np.full(8, winding))
+    found, state = plan.frame_forces(), plan.state
+    whole = float(plan.unstrained_length @ robot.cables.linear_density) * robot.gravity
+    total = (found.pulley + found.winch + found.guides[:, 0]).sum(axis=0)
+    expected = state.wrench[:3] - (robot.mass * robot.gravity + whole) * UP
+    np.testing.assert_allclose(total, expected, atol=1e-9 * np.abs(expected).max())
+    # the drum is below the eyelet, which is beside the anchor: the pull on the drum is upward, on the anchor outward
+    path = sl.Path([0.0, 1.0], sl.Pose(np.tile(state.pose.position, (2, 1)), np.eye(3)), *np.zeros((2, 2, 6)))
+    both = np.full((2, 8), winding)
+    still = sl.inverse(robot, path, wrench=WRENCH, tension=sl.MinimumNorm(), winding=both)
+    drawn = sl.winch_rates(still).drum_tension[0]
+    np.testing.assert_allclose(found.winch, drawn[:, None] * UP, rtol=1e-9, atol=1e-6)
+    assert state.contact is not None
+    weight = robot.cables.linear_density[:, None] * robot.gravity * state.contact.wrapped_length[:, None] * UP
+    behind = found.pulley - found.exit + weight
+    out = eyelet - robot.frame_anchors
+    assert (np.abs(np.cross(behind, out)[:, 2]) < 1e-9 * np.linalg.norm(out, axis=1)).all()  # in its vertical plane
+    assert ((behind * out).sum(axis=1) > 0.75 * drawn * np.linalg.norm(out, axis=1)).all()

@@ -8,13 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from sagline.core.arrays import Array, locked
-from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import codes
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.routing import tension_after
+from sagline.robot.routing import guide_forces, tension_after
 from sagline.robot.winch import Winch
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -24,8 +23,8 @@ _UP = np.array([0.0, 0.0, 1.0])
 class FrameForces(Result, Tabular):
     """Result of `Plan.frame_forces`: forces of the cables on the frame at one pose, or at N poses.
 
-    All forces are in world axes, shape (m, 3) or (N, m, 3), NaN without a solution. The sum of `pulley` and `winch` of
-    all cables is the external and inertial force on the platform plus the weight of platform and cables.
+    All forces are in world axes, shape (m, 3) or (N, m, 3), NaN without a solution. The sum of `pulley`, `winch` and
+    `guides` of all cables is the external and inertial force on the platform plus the weight of platform and cables.
 
     Attributes:
         state: Robot, poses and cables.
@@ -33,8 +32,10 @@ class FrameForces(Result, Tabular):
         exit: Force of the free span on the frame at the exit point [N]: cable force at the frame end.
         pulley: Force on the axle of the pulley, on the eyelet or on the anchor [N]: free span, cable between pulley and
             drum, and weight of the cable on the pulley. It is equal to `exit` if no cable continues behind the anchor.
-        winch: Sum of the forces on winch and guides behind the pulley [N]; zero if no cable continues behind the
-            anchor. For a drum directly below or above the pulley, it is the force on the winch.
+        winch: Force on the winch [N]. Without `guides` in the robot's winches, it is the sum of the forces on winch
+            and everything that guides the cable behind the pulley; zero if no cable continues behind the anchor.
+        guides: Forces on the guides between winch and frame anchor [N], in the order of `Winch.guides` without the
+            first, which is the winch, shape (..., m, k - 1, 3); (..., m, 0, 3) without guides.
     """
 
     _columns: ClassVar[Columns] = (
@@ -50,6 +51,7 @@ class FrameForces(Result, Tabular):
     exit: Array
     pulley: Array
     winch: Array
+    guides: Array
 
     @property
     def magnitude(self) -> Array:
@@ -80,15 +82,21 @@ def frame_forces_of(state: Equilibrium, path: Path | None) -> FrameForces:
 
     robot, contact, exit_force = state.one_robot, state.contact, frame_end_forces(state)
     winches = robot.winches
-    if winches is not None and winches.guides is not None:
-        step = "Give dead_cable, the whole guided length, instead of guides."
-        raise InvalidValueError("winches: guides", "given", "None for forces on the frame", step)
+    guided = np.zeros((*exit_force.shape[:-1], 0, 3))
     if contact is None or winches is None:
-        return FrameForces(state, path, locked(exit_force), locked(exit_force), locked(np.zeros(exit_force.shape)))
-    continues = (winches.pulley_radius > 0.0) | (winches.dead_cable > 0.0)
-    pull = np.where(continues, _entry_tension(state, winches), 0.0)[..., None] * winches.swivel_axis
-    on_pulley, behind = (each[..., None] * _UP for each in _weights(state))
-    return FrameForces(state, path, locked(exit_force), locked(exit_force - pull - on_pulley), locked(pull - behind))
+        pulley, winch = exit_force, np.zeros(exit_force.shape)
+    else:
+        on_pulley, behind = (each[..., None] * _UP for each in _weights(state))
+        if winches.guides is not None:
+            forces = guide_forces(state)
+            pulley, winch = exit_force - on_pulley + forces[..., 0, :], forces[..., -1, :]
+            guided = forces[..., -2:0:-1, :]
+        else:
+            continues = (winches.pulley_radius > 0.0) | (winches.dead_cable > 0.0)
+            pull = np.where(continues, _entry_tension(state, winches), 0.0)[..., None] * winches.swivel_axis
+            pulley, winch = exit_force - pull - on_pulley, pull - behind
+    fields = (np.ascontiguousarray(each) for each in (exit_force, pulley, winch, guided))
+    return FrameForces(state, path, *map(locked, fields))
 
 
 def _weights(state: Equilibrium) -> tuple[Array, Array]:

@@ -196,7 +196,7 @@ class Plan(Result, Saved, Tabular):
             FrameForces; NaN where the plan has no solution.
 
         Raises:
-            InvalidValueError: If the plan has one robot per pose, or the winches have `guides`.
+            InvalidValueError: If the plan has one robot per pose.
 
         Examples:
             >>> import sagline as sl

@@ -131,10 +131,26 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
     if guided or winches.guides is None:
         part = _straight_run(leaving, winches.dead_cable[cable], winches.dead_rise[cable])
     else:
-        points = np.concatenate((winches.guides, robot.frame_anchors[:, None]), axis=1)[:, ::-1]
-        part = _guided_spans(leaving, points[cable], winches, robot, state.cables.model, cable)
+        part = _guided_spans(leaving, winches, robot, state.cables.model, cable)[:2]
     for whole, some in zip(found, (_wrapped_length(leaving), *part), strict=True):
         whole[known] = some
+    return found
+
+
+def guide_forces(state: Equilibrium) -> Array:
+    """Forces [N] of the guided cables on frame anchors, guides and drums, world axes, (..., m, k + 1, 3).
+
+    The order is from the frame anchor to the drum. The robot must have k guides per cable.
+    """
+    robot, winches = state.one_robot, state.one_robot.winches
+    assert winches is not None
+    assert winches.guides is not None
+    refuse_slanted(robot)
+    known = np.isfinite(_exit_tension(state))
+    cable = np.broadcast_to(np.arange(known.shape[-1]), known.shape)[known]
+    found = np.full((*known.shape, winches.guides.shape[1] + 1, 3), np.nan)
+    leaving = _exit_state(state, robot, winches, known, cable)
+    found[known] = _guided_spans(leaving, winches, robot, state.cables.model, cable)[2]
     return found
 
 
@@ -201,13 +217,16 @@ def _straight_run(at: _ExitState, length: Array, rise: Array) -> tuple[Array, Ar
 
 
 def _guided_spans(
-    at: _ExitState, points: Array, winches: Winch, robot: Robot, model: CableModel, cable: Indices
-) -> tuple[Array, Array]:
+    at: _ExitState, winches: Winch, robot: Robot, model: CableModel, cable: Indices
+) -> tuple[Array, Array, Array]:
     """Unstrained length between pulley and drum [m], and tension at the drum [N], of cables with guides.
 
-    points: frame anchors A and guides, in the order toward the drum, (K, k + 1, 3) [m]. Tensions and bend angles depend
-    on each other, and are computed alternately until convergence.
+    Also returns the forces on anchors, guides and drums (K, k + 1, 3) [N]. Tensions and bend angles depend on each
+    other, and are computed alternately until convergence.
     """
+    assert winches.guides is not None
+    # frame anchors A and guides, in the order toward the drum
+    points = np.concatenate((winches.guides, robot.frame_anchors[:, None]), axis=1)[cable, ::-1]
     hanging = Catenary() if model.code == codes.CATENARY else Elastic()
     material = Cable(robot.cables.linear_density[cable], robot.cables.axial_stiffness[cable])
     axis, eyelet = winches.swivel_axis[cable], at.radius == 0.0
@@ -219,21 +238,24 @@ def _guided_spans(
     along = steps / np.linalg.norm(steps, axis=-1, keepdims=True)
     bends = [_angle(along[:, j], along[:, j - 1] if j else onward) for j in range(steps.shape[1])]
     length = np.full(at.tension.shape, np.nan)
-    tension = length
+    tension, forces = length, np.full(points.shape, np.nan)
     for _ in range(PASSES):
         last, length, leaving = length, np.zeros(length.shape), onward
         tension = at.entering(bends[0])
+        forces[:] = 0.0
         for j, step in enumerate(np.moveaxis(steps, 1, 0)):
             if j:
                 tension = tension * np.exp(at.friction * bends[j])
             span = _span(hanging, material, step, tension, robot.gravity)
             length, tension = length + span.unstrained_length, span.frame_end_tension
-            arriving, departing = _tangents(span, step)
-            bends[j], leaving = _angle(arriving, leaving), departing
+            upper, lower = _end_forces(span, step)
+            forces[:, j] -= upper
+            forces[:, j + 1] += lower
+            bends[j], leaving = _angle(_unit(upper), leaving), _unit(lower)
         settled = np.isnan(length) | (np.abs(length - last) <= _TOLERANCE * length)
         if settled.all() or not at.friction.any():
             break
-    return length, tension
+    return length, tension, forces
 
 
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
@@ -269,16 +291,16 @@ def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity:
     return replace(state, **gone)
 
 
-def _tangents(span: CableState, step: Array) -> tuple[Array, Array]:
-    """Unit tangents at both ends of catenaries over the vectors `step`; the tangents point toward the platform."""
-    level = np.hypot(step[:, 0], step[:, 1])[:, None]
-    outward = step[:, :2] / np.maximum(level, _TINY)
+def _end_forces(span: CableState, step: Array) -> tuple[Array, Array]:
+    """Forces (K, 3) [N] along both ends of catenaries over the vectors `step`; the forces point toward the platform."""
+    outward = step[:, :2] / np.maximum(np.hypot(step[:, 0], step[:, 1])[:, None], _TINY)
+    level, vertical = span.horizontal_tension[:, None] * outward, span.vertical_force
+    upper, lower = (np.column_stack((level, end)) for end in (vertical, vertical - span.cable_weight))
+    return upper, lower
 
-    def tangent(vertical: Array) -> Array:
-        force = np.concatenate((span.horizontal_tension[:, None] * outward, vertical[:, None]), axis=-1)
-        return np.asarray(force / np.maximum(np.linalg.norm(force, axis=-1, keepdims=True), _TINY))
 
-    return tangent(span.vertical_force), tangent(span.vertical_force - span.cable_weight)
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY))
 
 
 def _angle(one: Array, other: Array) -> Array:
