@@ -69,8 +69,8 @@ def test_at_rest_a_preset_is_where_forward_finds_it(name: str) -> None:
     np.testing.assert_allclose(data.sensor("tensions").data, expected.state.cables.frame_end_tension, rtol=1e-9)
     size = float(np.ptp(robot.frame_anchors, axis=0).max())
     away = newton_step(model, data, 1e-6 * size)
-    assert np.abs(away[:3]).max() < 3e-14 * size
-    assert np.abs(away[3:]).max() < 1e-12
+    assert np.abs(away[:3]).max() < 3e-15 * size
+    assert np.abs(away[3:]).max() < 1e-13
 
 
 @pytest.mark.parametrize("cables", [3, 4])
