@@ -129,9 +129,27 @@ def physics_engine(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
     return dict(zip(("length", "frame_end_tension", "position"), columns, strict=True))
 
 
+def jax_functions(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
+    """The functions of `sagline.jax`."""
+    import jax
+
+    import sagline.jax
+
+    jax.config.update("jax_enable_x64", True)
+    inverse = [sagline.jax.inverse(robot, pose[k]) for k in range(len(pose))]
+    forward = [sagline.jax.forward(robot, each.unstrained_length, near(pose[k])) for k, each in enumerate(inverse)]
+    found = {
+        "length": [each.unstrained_length for each in inverse],
+        "frame_end_tension": [each.tension for each in inverse],
+        "position": [each.position for each in forward],
+    }
+    return {name: np.array(rows) for name, rows in found.items()}
+
+
 Host = Callable[[sl.Robot, sl.Pose, Path], Answers]
 HOSTS: Final[tuple[Host, ...]] = (
     c_source, linuxcnc, physics_engine, unit_of_co_simulation, plain_python, web_assembly,
+    jax_functions,
 )  # fmt: skip
 QUICK: Final = (c_source, linuxcnc, physics_engine)  # in the first tier, with the first robot
 ROBOTS: Final = ("article-prototype", "ipanema-3-pulleys")

@@ -110,7 +110,7 @@ def _settings(state: Equilibrium, name: str, unit: Unit) -> str:
         f"COORDINATES = {'X Y Z A B C' if turns else 'X Y Z'}",
         f"LINEAR_UNITS = {unit}",
         "ANGULAR_UNITS = degree",
-        f"# HOME: unstrained length off the drum at X, Y, Z = {', '.join(f'{each:.6f}' for each in position)}",
+        f"# HOME: unstrained length at X Y Z = {' '.join(f'{each:.3f}' for each in position)}",
     ]
     for i, length in enumerate(PER_METER[unit] * state.unstrained_length):
         lines += [f"[JOINT_{i}]", "TYPE = LINEAR", f"HOME = {length:.6f}"]
