@@ -21,6 +21,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kinematics.inverse_rows import SOLVED, InverseRows
 from sagline.robot.batch import Robots, cables_of, first_of, robots_at
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing_chords, robot_terms
 
 if TYPE_CHECKING:
@@ -60,28 +61,33 @@ def solve_slanted_axes(
     geometry = chord_geometry(robot, pose, slanted=True)
     refuse_missing_chords(robot, pose, geometry)
     freedom, bodies, table = robot_terms(robot, slanted=True)
+    bare = table[..., : tables.CABLE_COLUMNS].copy()  # cables from eyelets
+    bare[..., tables.PULLEY_RADIUS :] = 0.0
+    bare[..., tables.ENTRY] = 1.0
+    ends = _ends(table, pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3))
+    moves = is_underconstrained(first_of(robot))
 
     def run(exits: Array, which: Indices, wider: ArrayLike, repeated: bool = True) -> _Pass:
         """One pass for the poses `which`, at limits that are wider by the share `wider` of their values."""
-        own, body = (each[which] if len(each) > 1 else each for each in (table, bodies))
+        own, body, eyelet = (each[which] if len(each) > 1 else each for each in (table, bodies, bare))
         eyelets = np.empty((*exits.shape[:2], tables.CABLE_COLUMNS))
-        eyelets[:] = own[..., : tables.CABLE_COLUMNS]
+        eyelets[:] = eyelet
         eyelets[..., : tables.PLATFORM_X] = exits
-        eyelets[..., tables.PULLEY_RADIUS :] = 0.0
-        eyelets[..., tables.ENTRY] = 1.0
-        eyelets[..., tables.TENSION_MIN] *= 1.0 - np.reshape(wider, (-1, 1))
-        eyelets[..., tables.TENSION_MAX] *= 1.0 + np.reshape(wider, (-1, 1))
+        if np.any(wider):
+            eyelets[..., tables.TENSION_MIN] *= 1.0 - np.reshape(wider, (-1, 1))
+            eyelets[..., tables.TENSION_MAX] *= 1.0 + np.reshape(wider, (-1, 1))
         found, rows = solve((freedom, locked(body), eyelets), which, repeated, locked(own))
-        reached = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
+        end = ends[which]
+        if moves:
+            reached = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
+            end = _ends(own, reached.position, reached.matrix)
         exits = np.ascontiguousarray(eyelets[..., : tables.PLATFORM_X])
-        chord = _ends(own, reached.position, reached.matrix) - exits
-        size = np.linalg.norm(chord, axis=-1)
+        chord = end - exits
+        size = _norm(chord)
         numbers = _next_exits(robots_at(robot, which), model, own, body, exits, chord, size, found.results)
-        moved = np.abs(numbers[..., :3] - exits).max(axis=-1) / size
-        return _Pass(found, rows, chord, numbers, np.nan_to_num(moved))
+        return _Pass(found, rows, chord, numbers, np.nan_to_num(_norm(numbers[..., :3] - exits) / size))
 
-    chord = _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
-    exits = _ends(table, pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3)) - chord
+    exits = ends - _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
     everywhere = np.arange(len(exits))
     near, unsure = np.zeros((2, len(exits)), dtype=np.bool_)  # poses whose limits were widened; without a sure verdict
     for count in range(PASSES):
@@ -100,7 +106,8 @@ def solve_slanted_axes(
     lost = (solved & (last.change > CLOSE).any(axis=-1)) | (short & (unsure | fresh))
     found.pose_status[lost] = codes.POSE_NOT_CONVERGED
     found.brackets[lost] = np.nan
-    _write(found.results, np.where(solved[:, None, None], last.chord, np.nan), last.numbers)
+    _write(found.results, last.chord, last.numbers)
+    found.results[tables.SINE :, ~solved] = np.nan
     if stability:
         found.pose_status[solved & ~lost & ~found.at_border] = codes.UNPROVED_STABILITY
     return found, last.rows
@@ -116,8 +123,9 @@ def _approach_limits(run: Callable[[Array, Indices, Array], _Pass], exits: Array
     for _ in range(PASSES):
         last = run(exits[which], which, wider)
         solved = last.solved
-        exits[which[solved]] = last.numbers[solved, :, :3]
-        moved[solved] = last.change[solved].max(axis=-1)
+        new, at = last.numbers[solved, :, :3], which[solved]
+        moved[solved] = (_norm(new - exits[at]) / _norm(last.chord[solved])).max(axis=-1)
+        exits[at] = new
         infeasible = last.found.pose_status == codes.POSE_INFEASIBLE
         sure = np.where(solved, wider < NARROWEST, infeasible & (moved < wider))
         unsure.append(which[~sure & ~solved & (wider < NARROWEST)])
@@ -135,9 +143,16 @@ def _ends(table: Array, position: Array, matrix: Array) -> Array:
     return np.asarray(position[:, None] + anchors @ np.swapaxes(matrix, -1, -2))
 
 
+def _norm(vectors: Array) -> Array:
+    """Lengths of vectors (..., 3); faster than numpy's norm."""
+    return np.asarray(np.sqrt(np.einsum("...k,...k->...", vectors, vectors)))
+
+
 def _world(cosine: Array, sine: Array, level: Array, up: Array) -> Array:
     """Vectors (..., 3) in world axes from their components in vertical planes with the azimuth of `cosine`, `sine`."""
-    return np.stack((level * cosine, level * sine, up), axis=-1)
+    vectors = np.empty((*up.shape, 3))
+    vectors[..., 0], vectors[..., 1], vectors[..., 2] = level * cosine, level * sine, up
+    return vectors
 
 
 def _next_exits(
@@ -167,5 +182,5 @@ def _write(results: Array, chord: Array, numbers: Array) -> None:
     """Write exit points and lengths off the drum to the results of cables without pulleys."""
     results[tables.WRAP], results[tables.WRAPPED], results[tables.DEAD] = np.moveaxis(numbers[..., 3:], -1, 0)
     results[tables.LENGTH] += results[tables.WRAPPED] + results[tables.DEAD]
-    results[tables.SINE] = chord[..., 2] / np.linalg.norm(chord, axis=-1)
+    results[tables.SINE] = chord[..., 2] / _norm(chord)
     results[tables.AZIMUTH] = np.arctan2(chord[..., 1], chord[..., 0])
