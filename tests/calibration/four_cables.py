@@ -149,11 +149,18 @@ def log_of_twin(twin: Twin, seed: int, poses: int = POSES) -> sl.WinchLog:
 
 def log_with_inclinations(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl.WinchLog, Array]:
     """The log of `log_of_twin`, and yaw, pitch and roll of the twin (N, 3) [rad]."""
+    log, angles, _ = log_with_poses(twin, seed, poses)
+    return log, angles
+
+
+def log_with_poses(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl.WinchLog, Array, Array]:
+    """The log of `log_of_twin`, yaw, pitch and roll of the twin (N, 3) [rad], and its position (N, 3) [m]."""
     rng = np.random.default_rng((seed, 1))
     lengths: list[Array] = []
     cells: list[Array] = []
     stood: list[Array] = []
     turned: list[Array] = []
+    placed_at: list[Array] = []
     while len(stood) < poses:
         place = rng.uniform([-0.7, -0.5, 0.4, -0.04], [0.7, 0.5, 1.7, 0.04])
         found = at_rest(twin, place)
@@ -166,6 +173,7 @@ def log_with_inclinations(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl
         cells.append(twin.gain * tension + twin.bias + CELL_NOISE * rng.normal(size=4))
         angles = np.array([place[3], found[1], found[0]])
         turned.append(angles)
+        placed_at.append(place[:3])
         stood.append(np.concatenate((place[:3] + 0.02 * rng.normal(size=3), angles + 0.01 * rng.normal(size=3))))
     placed = np.array(stood)
     log = sl.WinchLog(
@@ -174,4 +182,4 @@ def log_with_inclinations(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl
         commanded=sl.Pose(placed[:, :3], Rotation.from_euler("ZYX", placed[:, 3:])),
         sensors=sl.Sensors(LENGTH_NOISE, CELL_NOISE),
     )
-    return log, np.array(turned)
+    return log, np.array(turned), np.array(placed_at)

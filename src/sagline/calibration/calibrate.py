@@ -25,7 +25,14 @@ from sagline.calibration.parameters import (
     internal,
     parameters_of,
 )
-from sagline.calibration.problem import FitProblem, SearchState, held_lengths, readings_table, start_of
+from sagline.calibration.problem import (
+    FitProblem,
+    SearchState,
+    held_lengths,
+    readings_table,
+    start_of,
+    with_swivel_zeros,
+)
 from sagline.calibration.result import Calibration
 from sagline.calibration.screening import SPEED_LIMIT, moving_rows, reading_count, screen
 from sagline.calibration.search import cross_validate, search_from_priors
@@ -70,10 +77,10 @@ def calibrate(
             value.
         log: Readings at poses at rest.
         unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s. "default"
-            means frame anchors, length zeros, axial stiffness, mass and center of mass and, if load cells are
-            read, their gains and biases; for straight cables, frame anchors and length zeros. None is the same as
-            "default" alone. With "clock_offset", the time by which lengths are late, moving rows with a measured pose
-            are also used, without their load cells.
+            means frame anchors, length zeros, axial stiffness, mass and center of mass and, if they are read, gains and
+            biases of load cells and zeros of swivel angles; for straight cables, frame anchors and length zeros. None
+            is the same as "default" alone. With "clock_offset", the time by which lengths are late, moving rows with a
+            measured pose are also used, without their load cells.
         model: Cable model, exact, without weight, or straight. With straight cables, poses are fitted to the lengths
             and to measured poses without a force balance. Load cells are not used, and rows in motion are used.
         robust: True to reduce the weight of poses that do not fit the other poses.
@@ -126,7 +133,7 @@ def calibrate(
     if timed and usable is not None:
         fit_log = _without_inertia(fit_log, usable[rows])
     if straight:
-        log, fit_log = (one.replace(load_cells=None) for one in (log, fit_log))
+        log, fit_log = (one.replace(load_cells=None, swivel=None) for one in (log, fit_log))
     if straight and fit_log.rotation is None:
         log, fit_log = _with_assumed_rotations(robot, model, log, fit_log, wanted)
     sensors = active_sensors(fit_log)
@@ -175,6 +182,7 @@ def active_sensors(log: WinchLog) -> Sensors:
             ("tension_deviation", log.load_cells),
             ("position_deviation", log.position),
             ("rotation_deviation", log.rotation),
+            ("swivel_deviation", log.swivel),
         )
         if read is None or np.isnan(read).all()
     }
@@ -199,7 +207,7 @@ def _geometric_start(
     Without load cells, noise of the lengths makes cables slack at the reported lengths, and the search would end at one
     of several minima.
     """
-    asked = [one for one in unknowns if one.name not in OF_FORCES]
+    asked = [one for one in unknowns if one.name not in (*OF_FORCES, "swivel_zero")]
     try:
         found = calibrate(problem.robot, log, asked, model=Straight(), folds=0)
         at = dict(zip(found.parameters.labels, internal(found.parameters, found.values), strict=True))
@@ -210,6 +218,8 @@ def _geometric_start(
     if not np.isin(rows, found.rows).all():
         return None
     poses = pose_rows(found.poses)[np.searchsorted(found.rows, rows)]
+    numbers = with_swivel_zeros(problem, numbers, poses)
+    machine = problem.machine_at(numbers)
     reported = problem.reported_lengths(machine)
     return SearchState(numbers, machine, held_lengths(problem, machine, poses, reported, balanced=True), poses.copy())
 

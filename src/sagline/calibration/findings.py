@@ -76,7 +76,7 @@ class Outlier(Result):
     Attributes:
         row: Row of the log.
         cable: Index of the cable, or None for the whole pose.
-        quantity: "length", "load cell", "position" or "rotation".
+        quantity: "length", "load cell", "position", "rotation" or "swivel angle".
         size: Error [m, N or rad].
         deviations: Error in standard deviations.
     """
@@ -116,7 +116,7 @@ class SensorDeviation(Result):
     """Standard deviation of a kind of sensor, or of one cable's sensor, computed from the residuals of a calibration.
 
     Attributes:
-        quantity: "length", "load cell", "position" or "rotation".
+        quantity: "length", "load cell", "position", "rotation" or "swivel angle".
         cable: Index of the cable, or None if all cables have the same standard deviation.
         stated: Standard deviation of `Sensors` [m, N or rad].
         found: Standard deviation from the residuals; NaN if the readings do not determine a value.
@@ -206,7 +206,7 @@ class Findings(Result):
         return locked(correlation)
 
 
-QUANTITIES: Final = ("length", "load cell", "position", "rotation")
+QUANTITIES: Final = ("length", "load cell", "position", "rotation", "swivel angle")
 FEWEST: Final = 10.0  # smallest redundancy of a group of readings for which there is an estimate
 LARGEST: Final = 0.3  # largest relative standard error of an estimate; otherwise there is no estimate
 GROSS: Final = 4.5  # standard deviations: a smaller error is not an outlier
@@ -230,7 +230,7 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
         before, kept = used, np.flatnonzero(~np.isin(found.rows, gross))
         used = kept[evenly_spaced(len(kept), MOST)]
         read = ~np.isnan(found.residuals[used])
-        groups = [group for group in _groups(m, per_cable=per_cable) if read[:, group[2]].any()]
+        groups = [group for group in _groups(m, read.shape[1], per_cable=per_cable) if read[:, group[2]].any()]
         if len(groups) < 2:
             return ()
         if np.array_equal(before, used):
@@ -247,19 +247,19 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
     return tuple(deviations)
 
 
-def _groups(m: int, *, per_cable: bool) -> list[tuple[str, int | None, Indices]]:
-    """Quantity, cable and columns of each group of readings."""
-    ends = np.cumsum([0, m, m, 3, 3])
+def _groups(m: int, width: int, *, per_cable: bool) -> list[tuple[str, int | None, Indices]]:
+    """Quantity, cable and columns of each group of readings; width: number of all columns."""
+    ends = np.cumsum([0, m, m, 3, 3, width - 2 * m - 6])
     found: list[tuple[str, int | None, Indices]] = []
     for k, name in enumerate(QUANTITIES):
         columns = np.arange(*ends[k : k + 2])
-        split = per_cable and k < 2
+        split = per_cable and k in (0, 1, 4) and columns.size > 0
         found += [(name, i, columns[i : i + 1]) for i in range(m)] if split else [(name, None, columns)]
     return found
 
 
 def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Array, Array, Array, Array]:
-    """Whitened slopes (n, R, P), effects of errors (n, R, 2 m + 6), misfit (n, R) and root of the prior (P, P)."""
+    """Whitened slopes (n, R, P), effects of errors (n, R, m + R), misfit (n, R) and root of the prior (P, P)."""
     m, parameters = found.robot.cable_count, found.parameters
     lengths = np.atleast_2d(found.unstrained_length)[used]
     scale = prior_units(parameters).scale
@@ -279,7 +279,7 @@ def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Arra
     residuals = found.residuals[used]
     read = ~np.isnan(residuals[:, m:])
     slopes = by_values * slopes_of_values(found.robot, parameters) * scale * read[..., None]
-    noise = np.concatenate((by_length, np.broadcast_to(np.eye(m + 6), (len(used), m + 6, m + 6))), axis=2)
+    noise = np.concatenate((by_length, np.broadcast_to(np.eye(read.shape[1]), (*read.shape, read.shape[1]))), axis=2)
     noise = noise * np.where(np.isfinite(stated), stated, 0.0) * read[..., None]
     misfit = np.where(read, residuals[:, m:] - np.einsum("nij,nj->ni", by_length, residuals[:, :m]), 0.0)
     whiten = np.linalg.inv(np.linalg.cholesky(noise @ np.swapaxes(noise, 1, 2) + _units(~read)))

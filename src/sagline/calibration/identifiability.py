@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from sagline.calibration.findings import Direction
+from sagline.calibration.further import swivel_senses
 from sagline.calibration.log import Sensors
 from sagline.calibration.parameters import Parameters, PriorUnits, left_jacobian, prior_units
 from sagline.core.arrays import Array, Flags, Indices, locked
@@ -191,6 +192,7 @@ STEPS: Final = {  # kind of parameter: measurement of the kind; easy measurement
     "axial_stiffness": "choose poses with very different tensions, or measure the stretch of a piece of the cable",
     "center_of_mass": "balance the platform, or choose poses with more tilt",
     "platform_anchors": "measure the platform's anchors",
+    "swivel_zero": "read a swivel angle at a pose that is measured",
     "length_scale": "pay out a length along a tape",
     "clock_offset": "move faster",
     "length_zero": "home at a pose that is measured",
@@ -256,9 +258,10 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
     forces = ([kinds.DENSITY, kinds.STIFFNESS, kinds.MASS], 1.0)
     yield generator("larger forces, and load cells with a smaller gain", _FORCE, forces, (kinds.GAIN, -gain))
     up = np.array([0.0, 0.0, 1.0])
-    moved = [(_FRAME, np.cross(up, robot.frame_anchors).T), (_SHIFT, np.cross(up, place)[:, None])]
     turned = np.linalg.solve(left_jacobian(turn), up)[:, None]
-    yield generator("the world turned about the vertical", _YAW, *moved, (_TURN, turned))
+    moved: list[tuple[Any, Array | float]] = [(_FRAME, np.cross(up, robot.frame_anchors).T), (_TURN, turned)]
+    moved += [(_SHIFT, np.cross(up, place)[:, None]), (kinds.SWIVEL, -swivel_senses(robot))]
+    yield generator("the world turned about the vertical", _YAW, *moved)
     for axis, unit in zip("xyz", np.eye(3), strict=True):  # rotations and shifts about the center of mass
         anchors, target = np.cross(unit, robot.platform_anchors - center).T, np.cross(unit, sensors.target - center)
         changes = ((_PLATFORM, anchors), (_TARGET, target[:, None]))
@@ -297,6 +300,8 @@ def symmetries(
     matters[kinds.PER_CABLE : kinds.SCALE, 1:] = False
     # The pose of the measuring system and the target may change: a few measured points do not determine them.
     matters[kinds.SHIFT : kinds.SCALE] = False
+    if sensors.swivel_deviation is None:
+        matters[kinds.SWIVEL] = False
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False
     if not robot.freedom[:, 3:].any():  # a platform that cannot rotate: the center of mass has no effect

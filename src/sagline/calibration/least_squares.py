@@ -56,7 +56,7 @@ def whitened_at(
     machine = state.machine
     at = state.lengths[part] if free_of_noise else reported
     slopes = problem.winch_slopes(machine, at, part, counted=not free_of_noise)
-    readings = problem.readings(reported, part)
+    readings, further = problem.readings(reported, part), problem.further(part)
     turning = problem.parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     turn = left_jacobian(state.numbers[turning]) if turning[0] >= 0 else None
     if direction is not None and turn is not None:
@@ -65,7 +65,7 @@ def whitened_at(
     if problem.straight:
         rows = straight_rows(machine, readings, slopes, state.poses[part])
     else:
-        rows = whitened_rows(machine, readings, slopes, state.poses[part], state.lengths[part], direction)
+        rows = whitened_rows(machine, readings, slopes, state.poses[part], state.lengths[part], direction, further)
     if direction is None and turn is not None:
         rows.matrix[..., turning] = rows.matrix[..., turning] @ turn
     return rows

@@ -64,6 +64,8 @@ class Sensors(_Replaceable):
             if rotations are not measured. If the third value is infinite, the yaw is not measured, as with an
             inclinometer: roll and pitch refer to the vertical and the axes of the world, not to `frame`, and the yaw of
             the rotations in a log has no effect.
+        swivel_deviation: Standard deviation of the measured swivel angle of a pulley [rad], > 0, shape () or (m,); None
+            without such sensors.
         frame: Pose of the measuring system in the world; None for the axes of the world. If p are the measured
             coordinates of a point, its world coordinates are frame.position + frame.matrix p.
         target: The measured point of the platform, in the platform frame [m], shape (3,).
@@ -84,12 +86,15 @@ class Sensors(_Replaceable):
     rotation_deviation: Array | None = field(
         default=None, converter=if_known, metadata=rule("rad", above=0.0, infinite=True)
     )
+    swivel_deviation: Array | None = field(
+        default=None, kw_only=True, converter=if_known, metadata=rule("rad", above=0.0)
+    )
     frame: Pose = field(default=None, kw_only=True, converter=_world_if_none)
     target: Array = field(default=(0.0, 0.0, 0.0), kw_only=True, converter=given)
 
     def __attrs_post_init__(self) -> None:
         """Check every field once."""
-        for about in fields(Sensors)[:4]:
+        for about in fields(Sensors)[:5]:
             if (value := getattr(self, about.name)) is not None or about.default is not None:
                 own = checked(value, about.name, **about.metadata)
                 axes = 3 if about.name in ("position_deviation", "rotation_deviation") else None
@@ -110,13 +115,17 @@ def measures_yaw(sensors: Sensors) -> bool:
 
 
 def reading_deviations(sensors: Sensors, cables: int) -> Array:
-    """Standard deviations (2 m + 6,) of lengths, load cells, position and rotation; infinite for a missing sensor."""
-    parts = (
+    """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite for a missing sensor.
+
+    With swivel angles, their deviations (m,) follow.
+    """
+    parts = [
         (sensors.length_deviation, cables),
         (sensors.tension_deviation, cables),
         (sensors.position_deviation, 3),
         (sensors.rotation_deviation, 3),
-    )
+    ]
+    parts += [] if sensors.swivel_deviation is None else [(sensors.swivel_deviation, cables)]
     return np.concatenate([np.broadcast_to(np.inf if part is None else part, (size,)) for part, size in parts])
 
 
@@ -125,7 +134,7 @@ def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
     return (1.0, 0.0) if robot.winches is None else (robot.winches.load_cell_gain, robot.winches.load_cell_bias)
 
 
-_BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "time", "commanded")
+_BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "swivel", "time", "commanded")
 _UNIT = 1e-6  # allowed error of a quaternion's norm; quaternions that were printed with seven digits are accepted
 
 
@@ -146,6 +155,8 @@ class WinchLog(_Replaceable, Saved, Tabular):
         time: Time of each row [s], shape (N,), in any order; or None.
         commanded: N commanded poses, near the actual poses; or None.
         sensors: Standard deviations of all readings; None for `Sensors()`, which contains only lengths.
+        swivel: Measured swivel angles of the pulleys [rad], relative to unknown zeros, shape (N, m), NaN if missing; or
+            None. The angle is the direction of the cable about its swivel axis, 0 along x.
         source: Text that states the origin of the readings, such as a file name.
 
     Raises:
@@ -176,6 +187,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
         "q@=rotation",
         "@_commanded=commanded.position",
         "q@_commanded=commanded.quaternion",
+        "swivel_#=swivel",
     )
 
     counts: Array | None = field(default=None, converter=if_known)
@@ -187,6 +199,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
     commanded: Pose | None = None
     sensors: Sensors = field(default=None, converter=_default_if_none)
     source: str = ""
+    swivel: Array | None = field(default=None, kw_only=True, converter=if_known)
 
     def __attrs_post_init__(self) -> None:
         """Check every field once, and check that the fields are consistent."""
@@ -194,7 +207,8 @@ class WinchLog(_Replaceable, Saved, Tabular):
         read = _table(values, name, unit_, None, None)
         n, m = read.shape
         object.__setattr__(self, name, read)
-        for name, unit_, columns in (("load_cells", "N", m), ("position", "m", 3), ("rotation", "", 4)):
+        columns_of = (("load_cells", "N", m), ("position", "m", 3), ("rotation", "", 4), ("swivel", "rad", m))
+        for name, unit_, columns in columns_of:
             if (value := getattr(self, name)) is not None:
                 table = _table(value, name, unit_, n, columns)
                 object.__setattr__(self, name, _quaternions(table) if name == "rotation" else table)
@@ -269,6 +283,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
             (self.load_cells, self.sensors.tension_deviation),
             (self.position, self.sensors.position_deviation),
             (rest.rotation_vectors(self.rotation), self.sensors.rotation_deviation),
+            (self.swivel, self.sensors.swivel_deviation),
         )
         parts = rest.rests_of(self.time, readings, number(duration, "duration", "s", above=0.0))
         means: dict[str, Any] = {}
@@ -287,6 +302,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
             (self.load_cells, "reading of load cells", "readings of load cells"),
             (self.position, "measured coordinate", "measured coordinates"),
             (None if self.rotation is None else self.rotation[:, 0], f"measured {turned}", f"measured {turned}s"),
+            (self.swivel, "swivel angle", "swivel angles"),
         ):
             if values is not None:
                 count = np.count_nonzero(~np.isnan(values))
@@ -342,14 +358,15 @@ def _check_sensors(log: WinchLog, cables: int) -> None:
         ("tension_deviation", log.load_cells, cables),
         ("position_deviation", log.position, 3),
         ("rotation_deviation", log.rotation, 3),
+        ("swivel_deviation", log.swivel, cables),
     )
-    names = {"tension_deviation": "load_cells", "position_deviation": "position", "rotation_deviation": "rotation"}
+    names = {"tension_deviation": "load_cells"}
     for name, read, size in pairs:
         deviation = getattr(log.sensors, name)
-        item = f"sensors: {name}"
+        item, read_name = f"sensors: {name}", names.get(name, name.removesuffix("_deviation"))
         if read is not None and deviation is None:
-            step = f"Give sensors=Sensors({name}=...), or leave {names[name]} out."
-            raise InvalidValueError(item, "None", f"the standard deviation of {names[name]}", step)
+            step = f"Give sensors=Sensors({name}=...), or leave {read_name} out."
+            raise InvalidValueError(item, "None", f"the standard deviation of {read_name}", step)
         if deviation is not None and deviation.shape not in ((), (size,)):
             step = "Give one value for all, or one value per entry."
             raise InvalidValueError(item, f"of shape {deviation.shape}", f"shape () or ({size},)", step)

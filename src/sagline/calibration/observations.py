@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel
-from sagline.calibration.log import Sensors, load_cells_of, measures_yaw
+from sagline.calibration.further import FurtherReadings, swivel_rows, whitened_further
+from sagline.calibration.log import Sensors, load_cells_of, measures_yaw, reading_deviations
 from sagline.calibration.parameters import Parameters, slopes_of_values
 from sagline.core.arrays import Array, kernel_input, locked
 from sagline.core.progress import blocks
@@ -27,6 +29,8 @@ STEP: Final = 1e-4  # relative step of a drum radius or length zero for differen
 # length_zero, drum_radius, axial_stiffness, length_scale and clock_offset, as in `kernels.calibration.observe`
 SLOPES: Final = 5
 BLOCK: Final = 1 << 9  # number of poses per kernel call; its work arrays take about 10 MB
+EXACT: Final = 1e-10  # [m], standard deviation of lengths that is too small to affect the whitening
+POSE_SENSORS: Final = Sensors(EXACT, 1.0, 1.0, 1.0)  # pose of the platform in the world, with deviations of 1
 NO_LOAD: Final = locked(np.zeros((1, 6)))  # no external wrench: only cable forces and weight act on the platform
 
 
@@ -54,14 +58,15 @@ def _known_field(of: Winch | Cable, name: str) -> Array:
 class WhitenedRows(NamedTuple):
     """Whitened observations at N equilibria: the rows are independent, each with a standard deviation of 1.
 
-    The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured.
+    The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured; with swivel angles, m
+    more.
     """
 
     # Derivatives by the internal parameters, (N, R, P), after elimination of the true lengths. Rows without a reading
     # are zero. Where `logarithmic` is True, the internal parameter is the logarithm.
     matrix: Array
     misfit: Array  # readings minus predictions, (N, R)
-    residual: Array  # residuals [N, m, rad] at the given lengths, (N, m + 6); NaN if missing
+    residual: Array  # residuals [N, m, rad] at the given lengths, (N, m + 6 or 2 m + 6); NaN if missing
     back: Array  # change of the true lengths [m] per unit of misfit, (N, m, R)
     # Motion of the platform's center of mass [m, rad], world axes, (N, m + 1, 6). Each of the first m rows is the
     # motion per unit of a true length. The last row is the motion for a step along a direction. Without a direction, it
@@ -104,6 +109,7 @@ class MachineTerms(NamedTuple):
     offset: Array  # offset of reported lengths [m], (m,)
     scale: Array  # scale of reported lengths, (m,)
     late: Array  # times by which the reported lengths are late [s], (m,)
+    swivel_zero: Array  # readings of swivel angles of cables along x [rad], (m,)
     drums: Drums | None  # drums if counts are read; else None
     terms: ForwardTerms  # cable model in the form of the kernel
     body: Array  # body_table
@@ -120,6 +126,7 @@ def machine_of(
     offset: Array | float = 0.0,
     scale: Array | float = 1.0,
     late: Array | float = 0.0,
+    swivel_zero: Array | float = 0.0,
 ) -> MachineTerms:
     """A robot and its sensors as arrays for the kernel; raises an error if counts need drum data that are missing."""
     machine = MachineTerms(
@@ -130,6 +137,7 @@ def machine_of(
         np.broadcast_to(offset, robot.cable_count),
         np.broadcast_to(scale, robot.cable_count),
         np.broadcast_to(late, robot.cable_count),
+        np.broadcast_to(swivel_zero, robot.cable_count),
         drums_of(robot) if parameters.counted else None,
         (model.code, *model.parameters, has_routing(robot) or None),
         body_table(robot),
@@ -187,12 +195,69 @@ def whitened_rows(
     poses: Array,
     lengths: Array,
     direction: Array | None = None,
+    further: FurtherReadings | None = None,
 ) -> WhitenedRows:
     """Whitened readings and derivatives at equilibria; NaN where the equilibrium is not stable.
 
     slopes: derivatives of reported lengths (5, N, m) from `winch_slopes`. If `direction` (P,) is given, only the slopes
     along this direction are computed, so that P is 1 in the result.
     """
+    found = _observed(machine, readings, slopes, poses, lengths, direction)
+    return (
+        found
+        if further is None
+        else _with_further(machine, readings, slopes, poses, lengths, direction, further, found)
+    )
+
+
+def _with_further(
+    machine: MachineTerms,
+    readings: PoseReadings,
+    slopes: Array,
+    poses: Array,
+    lengths: Array,
+    direction: Array | None,
+    further: FurtherReadings,
+    found: WhitenedRows,
+) -> WhitenedRows:
+    """The whitened rows `found`, with those of further readings after them."""
+    m, sensors, where = lengths.shape[1], machine.sensors, machine.parameters.where.copy()
+    where[kinds.SHIFT : kinds.SCALE] = -1  # the measuring system does not move the platform
+    parameters = replace(machine.parameters, where=locked(where))
+    plain = machine._replace(sensors=POSE_SENSORS, sensing=_sensor_arrays(machine.robot, POSE_SENSORS))
+    moves = _observed(plain._replace(parameters=parameters), _no_readings(lengths), slopes, poses, lengths, direction)
+    motion = moves.matrix[:, m:], np.swapaxes(moves.back, 1, 2)[:, m:] / EXACT**2
+    factor = machine.slopes if direction is None else machine.slopes * direction
+    scale, places = np.where(where >= 0, factor[where], 0.0), where if direction is None else np.minimum(where, 0)
+    rows = swivel_rows(machine.robot, machine.swivel_zero, further.swivels, poses, places, scale, motion)
+    deviation, given = reading_deviations(sensors, m), np.broadcast_to(sensors.length_deviation, m)
+    off = readings.lengths - lengths
+    more = whitened_further(rows, deviation[2 * m + 6 :], off, given**2, (found.matrix, found.misfit, found.back))
+    return found._replace(
+        matrix=np.concatenate((found.matrix, more[0]), axis=1),
+        misfit=np.concatenate((found.misfit, more[1]), axis=1),
+        back=np.concatenate((found.back, more[2]), axis=2),
+        residual=np.concatenate((found.residual, rows.residual), axis=1),
+    )
+
+
+def _no_readings(lengths: Array) -> PoseReadings:
+    """Lengths (N, m) [m] with other readings that are not missing, for derivatives of predictions."""
+    count = len(lengths)
+    return PoseReadings(
+        lengths, np.zeros(lengths.shape), np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+    )
+
+
+def _observed(
+    machine: MachineTerms,
+    readings: PoseReadings,
+    slopes: Array,
+    poses: Array,
+    lengths: Array,
+    direction: Array | None,
+) -> WhitenedRows:
+    """The whitened readings that the kernel knows."""
     count, m = lengths.shape
     parameters, factor, width = machine.parameters, machine.slopes, len(machine.slopes)
     where = locked(np.ascontiguousarray(parameters.where).view())
@@ -235,20 +300,17 @@ def predicted_rows(
     offset [m], scale: of the reported lengths, each (m,) or one number.
     """
     machine = machine_of(robot, model, parameters, sensors, offset, scale)
-    slopes, count = winch_slopes(machine, lengths), len(lengths)
-    aligned = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
-    readings = PoseReadings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), aligned)
-    rows = whitened_rows(machine, readings, slopes, poses, lengths)
+    further = None if sensors.swivel_deviation is None else FurtherReadings(None)
+    slopes, readings = winch_slopes(machine, lengths), _no_readings(lengths)
+    rows = whitened_rows(machine, readings, slopes, poses, lengths, further=further)
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
-
-
-EXACT: Final = 1e-10  # [m], standard deviation of lengths that is too small to affect the whitening
 
 
 def unit_sensors(sensors: Sensors) -> Sensors:
     """Sensors for all readings, each with a standard deviation of 1 in SI units, and with exact lengths."""
     rotation = [1.0, 1.0, 1.0 if sensors.rotation_deviation is None or measures_yaw(sensors) else np.inf]
-    return Sensors(EXACT, 1.0, 1.0, rotation, frame=sensors.frame, target=sensors.target)
+    swivel = None if sensors.swivel_deviation is None else 1.0
+    return Sensors(EXACT, 1.0, 1.0, rotation, swivel_deviation=swivel, frame=sensors.frame, target=sensors.target)
 
 
 def unwhitened_slopes(
@@ -261,13 +323,15 @@ def unwhitened_slopes(
     offset: Array | float = 0.0,
     scale: Array | float = 1.0,
 ) -> tuple[Array, Array]:
-    """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths."""
-    count, m = lengths.shape
-    by_values, by_length = np.empty((count, m + 6, len(parameters.names))), np.empty((count, m + 6, m))
+    """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths.
+
+    With swivel angles, their derivatives follow in m more rows.
+    """
+    (count, m), sensors = lengths.shape, unit_sensors(sensors)
+    width = len(reading_deviations(sensors, m)) - m
+    by_values, by_length = np.empty((count, width, len(parameters.names))), np.empty((count, width, m))
     for part in blocks(count, BLOCK):
-        rows = predicted_rows(
-            robot, model, parameters, unit_sensors(sensors), poses[part], lengths[part], offset, scale
-        )
+        rows = predicted_rows(robot, model, parameters, sensors, poses[part], lengths[part], offset, scale)
         by_values[part] = rows.matrix / slopes_of_values(robot, parameters)
         by_length[part] = np.swapaxes(rows.back, 1, 2) / EXACT**2
     return by_values, by_length

@@ -12,6 +12,7 @@ from scipy.special import chdtrc, gammaln
 
 from sagline.calibration import observations
 from sagline.calibration.findings import QUANTITIES, Outlier
+from sagline.calibration.further import FurtherReadings
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
 from sagline.calibration.parameters import Unknown, parameters_of
@@ -60,6 +61,7 @@ class _Case(NamedTuple):
     pose: Array  # pose row, (1, POSE_COLUMNS)
     lengths: Array  # true lengths [m], (1, m)
     read: Flags  # flags of the available readings, (m + 6,)
+    further: FurtherReadings | None  # readings that the kernel does not know; (m,) more of all arrays of readings
 
     def misses(self) -> tuple[Array, Array]:
         """Misfits (2 m + 6,) of lengths and readings, and derivatives (m + 6, m) of readings by true lengths.
@@ -74,7 +76,9 @@ class _Case(NamedTuple):
             off[there], by_pose[there] = lines.residual[0], lines.by_pose[0]
             return off, by_pose
         slopes = np.zeros((observations.SLOPES, 1, self.lengths.shape[1]))
-        rows = observations.whitened_rows(self.machine, self.readings, slopes, self.pose, self.lengths)
+        rows = observations.whitened_rows(
+            self.machine, self.readings, slopes, self.pose, self.lengths, further=self.further
+        )
         off = np.concatenate((self.readings.lengths[0] - self.lengths[0], rows.residual[0]))
         return off, rows.back[0].T / observations.EXACT**2
 
@@ -125,12 +129,12 @@ def _linear_fit(
     m, read = case.lengths.shape[1], case.read
     slopes, variance = by_length[read], case.deviation[:m] ** 2
     missed = misses[m:][read] - slopes @ misses[:m]
-    columns = np.hstack((-slopes, np.eye(m + 6)[read]))[:, which]
+    columns = np.hstack((-slopes, np.eye(len(read))[read]))[:, which]
     factor = cho_factor(np.diag(case.deviation[m:][read] ** 2) + (slopes * variance) @ slopes.T)
     inverse = np.linalg.pinv(columns.T @ cho_solve(factor, columns), hermitian=True)
     off = inverse @ (columns.T @ cho_solve(factor, missed))
     rest = missed - columns @ off
-    errors = np.zeros(2 * m + 6)
+    errors = np.zeros(len(misses))
     errors[which] = off
     wanted: Array = case.readings.lengths[0] - errors[:m] + variance * (slopes.T @ cho_solve(factor, rest))
     sizes, deviations, first = [], [], 0
@@ -178,15 +182,16 @@ def outliers_in(
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = problem.reported_lengths(machine)
     deviation = reading_deviations(machine.sensors, m)
-    read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3]))) & np.isfinite(deviation[m:])
+    more = [] if log.swivels is None else [log.swivels]
+    read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3], *more))) & np.isfinite(deviation[m:])
     exact = observations.unit_sensors(machine.sensors)
     parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), exact, counted=False)  # not used
-    exactly = observations.machine_of(machine.robot, problem.model, parameters, exact)
+    exactly = observations.machine_of(machine.robot, problem.model, parameters, exact, swivel_zero=machine.swivel_zero)
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)
         readings = PoseReadings(reported[one], log.cells[one], log.positions[one], log.rotations[one])
-        case = _Case(exactly, deviation, readings, state.poses[one], state.lengths[one], read[k])
+        case = _Case(exactly, deviation, readings, state.poses[one], state.lengths[one], read[k], problem.further(one))
         found += _outliers_at(case, row, count)
     return tuple(found)
 
@@ -201,6 +206,8 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
     for quantity, first in (("position", m), ("rotation", m + 3)):
         if (own := np.flatnonzero(case.read[first : first + 3])).size:
             suspects.append(_Suspect(quantity, None, m + first + own))
+    swivels = np.flatnonzero(case.read[m + 6 :]).tolist()
+    suspects += [_Suspect("swivel angle", cable, np.array([2 * m + 6 + cable])) for cable in swivels]
     taken: list[_Suspect] = []
     before = whole.squares
     for _ in range(_MOST):
@@ -232,7 +239,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
             each = zip(taken, fits[best].sizes, fits[best].deviations, strict=True)
             return [Outlier(row, one.cable, one.quantity, size, many) for one, size, many in each]
     off, _ = case.misses()
-    parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))
+    parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6), slice(2 * m + 6, None))
     worst = int(np.argmax([float(np.nansum((off[part] / case.deviation[part]) ** 2)) for part in parts]))
     size = float(np.sqrt(np.nansum(off[parts[worst]] ** 2)))
     return [Outlier(row, None, QUANTITIES[worst], size, float(np.sqrt(whole.squares)))]

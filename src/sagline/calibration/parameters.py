@@ -33,7 +33,7 @@ class Kind(NamedTuple):
     logarithmic: bool  # True if the logarithm is estimated, because the value is positive and its deviation is relative
     deviation: float  # standard deviation of a value from a drawing or data sheet, relative if logarithmic
     assumed: float  # standard deviation of a value that the robot's source does not state
-    # readings that depend on the quantity: "counts", "lengths", "load cells", "positions", "motion"; "" for all
+    # readings that depend on the quantity, as in `is_observed`; "" for all
     needs: str = ""
     common: float = 0.0  # share of the prior variance that the values of all cables have in common, 0 to 1
 
@@ -57,6 +57,7 @@ KINDS: Final[dict[str, Kind]] = {
     "measuring_frame": Kind("system", "m", kinds.SHIFT, _SIX, False, False, False, 10.0, 10.0, "positions"),
     "length_scale": Kind("system", "", kinds.SCALE, _ONE, True, False, False, 0.02, 0.1, "lengths"),
     "clock_offset": Kind("system", "s", kinds.CLOCK, _ONE, True, True, False, 0.1, 1.0, "motion"),
+    "swivel_zero": Kind("system", "rad", kinds.SWIVEL, _ONE, True, False, False, np.pi, np.pi, "swivel angles"),
     "target": Kind("system", "m", kinds.TARGET, _XYZ, False, False, False, 0.1, 1.0, "positions"),
 }
 
@@ -131,10 +132,11 @@ DEFAULT: Final = "default"  # in a list of unknowns, it means the default unknow
 
 
 def _default_unknowns(sensors: Sensors, *, straight: bool) -> tuple[str, ...]:
-    """Default unknowns, with gains and biases of the load cells if `sensors` has load cells; `straight`: no forces."""
+    """Default unknowns, with those of load cells and swivel angles if `sensors` has them; `straight`: no forces."""
     if straight:
         return UNKNOWNS[:2]
-    return UNKNOWNS if sensors.tension_deviation is None else (*UNKNOWNS, *OF_CELLS)
+    cells = () if sensors.tension_deviation is None else OF_CELLS
+    return (*UNKNOWNS, *cells, *(() if sensors.swivel_deviation is None else ("swivel_zero",)))
 
 
 _NOTHING: Final = {"dead_cable": "0 m", "pulley_radius": "0 m"}
@@ -196,7 +198,7 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
         return np.concatenate((sensors.frame.position, np.zeros(3)))[None]
     if name == "target":
         return np.asarray(sensors.target)[None]
-    if name in ("length_scale", "clock_offset") or (name == "length_zero" and not counted):
+    if name in ("length_scale", "clock_offset", "swivel_zero") or (name == "length_zero" and not counted):
         return np.full((m, 1), float(name == "length_scale"))
     value = _field(robot, name)
     if value is None:
@@ -223,6 +225,7 @@ def is_observed(kind: Kind, sensors: Sensors, counted: bool) -> bool:
         "lengths": not counted,
         "motion": False,  # `calibrate` checks the times of a log
         "load cells": sensors.tension_deviation is not None,
+        "swivel angles": sensors.swivel_deviation is not None,
         "positions": sensors.position_deviation is not None or measures_yaw(sensors),
     }[kind.needs]
 
@@ -237,6 +240,7 @@ def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: K
         "lengths": "Give lengths in place of counts, or leave it out; drum_radius is the scale of counts.",
         "load cells": "Add load cells to the log, or give a prior: Unknown(name, deviation=...); or leave it out.",
         "positions": "Add measured positions to the log, or leave it out.",
+        "swivel angles": "Add swivel angles to the log, or leave it out.",
     }[kind.needs]
     raise InvalidValueError(f"unknown: {unknown.name}", "observed by no reading", f"{kind.needs} in the log", add)
 

@@ -101,6 +101,7 @@ def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
         ("load cells", read.tension_deviation, "N"),
         ("positions", read.position_deviation, "m"),
         ("rotations", read.rotation_deviation, "rad"),
+        ("swivel angles", read.swivel_deviation, "rad"),
     )
     texts = [
         f"{words} ({information.error_text(float(np.max(deviation[np.isfinite(deviation)])), unit)})"
@@ -239,7 +240,8 @@ def calibration_poses(
     where = _box(robot, box)
     standing = candidates_of(robot, _CATENARY, where, tried, drawn, progress)
     read = sensors or _default_sensors(robot, standing.tensions)
-    if read.tension_deviation is None and read.position_deviation is None and read.rotation_deviation is None:
+    others = read.tension_deviation, read.position_deviation, read.rotation_deviation, read.swivel_deviation
+    if all(deviation is None for deviation in others):
         step = "Give Sensors(tension_deviation=...), or leave sensors out."
         raise InvalidValueError("sensors", "lengths alone", "load cells, positions or rotations in addition", step)
     parameters = parameters_of(robot, (DEFAULT,) if unknowns is None else unknowns, read, counted=has_drum_data(robot))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
+from sagline.calibration.further import FurtherReadings, circular_mean, swivel_angles
 from sagline.calibration.log import Sensors, WinchLog, load_cells_of, measures_yaw
 from sagline.calibration.observations import (
     NO_LOAD,
@@ -56,6 +57,7 @@ class ReadingsTable(NamedTuple):
     rotations: Array  # measured rotations as unit quaternions, (N, 4)
     # speed [m/s] and acceleration [m/s^2] of the reported lengths, (2, N, m); None if clock_offset is not estimated
     motion: Array | None = None
+    swivels: Array | None = None  # swivel angles [rad], (N, m), or None
 
 
 def readings_table(log: WinchLog) -> ReadingsTable:
@@ -63,7 +65,8 @@ def readings_table(log: WinchLog) -> ReadingsTable:
     count, m = log.readings.shape
     columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
     tables = (np.broadcast_to(np.nan, (count, width)) if read is None else read for read, width in columns)
-    return ReadingsTable(log.counts, log.unstrained_length, *tables)
+    cells, positions, rotations = tables
+    return ReadingsTable(log.counts, log.unstrained_length, cells, positions, rotations, None, log.swivel)
 
 
 class FitProblem(NamedTuple):
@@ -108,6 +111,10 @@ class FitProblem(NamedTuple):
         """Readings at the poses `part` with the reported lengths `reported` (n, m) [m]."""
         return PoseReadings(reported, self.log.cells[part], self.log.positions[part], self.log.rotations[part])
 
+    def further(self, part: slice) -> FurtherReadings | None:
+        """Readings at the poses `part` that the kernel does not know; None without such readings."""
+        return None if self.log.swivels is None else FurtherReadings(self.log.swivels[part])
+
     def missed(self, numbers: Array) -> Array:
         """Differences (P,) between the internal parameters `numbers` and their priors, in prior standard deviations."""
         return np.asarray(self.prior_root @ (numbers - self.prior))
@@ -137,8 +144,8 @@ class FitProblem(NamedTuple):
         robot = with_values(self.robot, parameters, values)
         sensors, offset = sensors_with(self.sensors, parameters, values), offset_with(self.robot, parameters, values)
         scale = values_in(parameters, values, kinds.SCALE, 1.0)
-        late = values_in(parameters, values, kinds.CLOCK, 0.0)
-        return machine_of(robot, self.model, parameters, sensors, offset, scale, late)
+        late, turned = (values_in(parameters, values, row, 0.0) for row in (kinds.CLOCK, kinds.SWIVEL))
+        return machine_of(robot, self.model, parameters, sensors, offset, scale, late, turned)
 
     def reported_lengths(self, machine: MachineTerms, part: slice = slice(None)) -> Array:
         """Lengths (n, m) [m] that the winches report at the poses `part`."""
@@ -218,7 +225,19 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
         zeros, off = problem.parameters.where[kinds.ZERO], np.nanmedian(lengths - reported, axis=0)
         for at in np.unique(zeros):
             aligned[at] += off[zeros == at].mean()
+    aligned = with_swivel_zeros(problem, aligned, poses)
     return SearchState(aligned, machine if aligned is numbers else problem.machine_at(aligned), lengths, poses)
+
+
+def with_swivel_zeros(problem: FitProblem, numbers: Array, poses: Array) -> Array:
+    """Parameters whose unknown zeros of swivel angles are the mean differences to the directions of the cables."""
+    zeros = problem.parameters.where[kinds.SWIVEL]
+    if problem.log.swivels is None or (zeros < 0).all():
+        return numbers
+    found, off = numbers.copy(), problem.log.swivels - swivel_angles(problem.robot, poses)
+    for at in np.unique(zeros[zeros >= 0]):
+        found[at] += circular_mean(off[:, zeros == at] - found[at])
+    return found
 
 
 def held_lengths(

@@ -81,7 +81,7 @@ def _root_of_trace(covariance: Array) -> Array:
 MOST = 300  # largest number of poses for the computation of the motion that is common to all poses
 _NEGLIGIBLE = 1e-12  # a slope is zero if it is less than this share of the largest slope
 # kinds without an effect on poses
-_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias", "clock_offset")
+_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias", "clock_offset", "swivel_zero")
 
 
 def motion_slopes(
@@ -145,7 +145,7 @@ class Calibration(Findings, Saved):
         poses: Poses of the platform, N of them.
         unstrained_length: True lengths of the cables [m], (N, m).
         residuals: Readings minus predictions: lengths [m], load cells [N], position [m], rotation [rad], shape (N, 2 m
-            + 6); NaN if missing.
+            + 6), and with swivel angles [rad] (N, 3 m + 6); NaN if missing.
         chi_squared_of_pose: Chi squared of each pose, (N,).
         weights: Weights of the poses, (N,); less than 1 for a pose that does not fit the other poses.
         outliers: Readings that do not fit.
@@ -237,6 +237,11 @@ class Calibration(Findings, Saved):
     def length_scale(self) -> Array:
         """Scale of reported lengths, shape (m,); 1 where it was not estimated."""
         return values_in(self.parameters, self.values, kinds.SCALE, 1.0)
+
+    @property
+    def swivel_zero(self) -> Array:
+        """Readings of swivel angles of cables along x [rad], shape (m,); 0 where they were not estimated."""
+        return values_in(self.parameters, self.values, kinds.SWIVEL, 0.0)
 
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
         reported = self.length_offset, self.length_scale

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sagline.cables.models import models_by_name
-from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Direction, Omission, Outlier
+from sagline.calibration.findings import (
+    QUANTITIES,
+    CalibrationStatus,
+    Criticism,
+    CrossValidation,
+    Direction,
+    Omission,
+    Outlier,
+)
 from sagline.calibration.log import Sensors
 from sagline.calibration.parameters import KINDS, Parameters
 from sagline.calibration.result import Calibration
@@ -30,8 +38,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 READ: Final = ("lengths", "counts")  # quantity that the winches report; the index is Parameters.counted
-UNITS = ("m", "kg/m", "N", "kg", "rad", "1")
-OUTLYING = ("length", "load cell", "position", "rotation")
+UNITS = ("m", "kg/m", "N", "kg", "rad", "s", "1")
 P: Final = ("parameter",)
 N: Final = ("pose",)
 PARAMETERS: Final = (
@@ -52,7 +59,8 @@ PARAMETERS: Final = (
     Quantity("prior_stated", P, "", "source of the prior: tolerances or caller", "stated", values=bool),
     Quantity("logarithmic", P, "", "true if the logarithm was estimated", values=bool),
 )
-READINGS: Final = "lengths [m], load cells [N], position [m], rotation [rad]"
+READINGS: Final = "lengths [m], load cells [N], position [m], rotation [rad], swivel angles [rad]"
+OLDEST: Final = 27  # number of kinds in the oldest files
 FOUND: Final = (
     Quantity("length_offset", ("cable",), "m", "correction of the lengths of the machine"),
     Quantity("status", (), "", "status of the calibration", codes=CalibrationStatus),
@@ -74,6 +82,7 @@ SENSORS: Final = {  # name in the file: attribute and unit; a value is one numbe
     "tension_deviation": ("cable", "N"),
     "position_deviation": ("axis", "m"),
     "rotation_deviation": ("axis", "rad"),
+    "swivel_deviation": ("cable", "rad"),
 }
 PLACED: Final = (
     Quantity("measuring_position", ("axis",), "m", "position of the measuring system", "frame.position"),
@@ -138,15 +147,16 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
         if any(one.name in data.variables for one in group):
             quantities += group
     sizes = {str(name): size for name, size in data.sizes.items()}
-    kind_rows = max(KIND_ROWS - 2, min(sizes.get("kind_row", 0), KIND_ROWS))  # older files do not have the last kinds
-    fixed = {"cable": m, "reading": 2 * m + 6, "kind_row": kind_rows, "other_parameter": sizes.get("parameter", 0)}
+    kind_rows = max(OLDEST, min(sizes.get("kind_row", 0), KIND_ROWS))  # older files do not have the last kinds
+    readings = (3 if "swivel_deviation" in data.variables else 2) * m + 6
+    fixed = {"cable": m, "reading": readings, "kind_row": kind_rows, "other_parameter": sizes.get("parameter", 0)}
     v.check_variables(data, quantities, sizes | fixed)
     ranges = {"parameter_cable": (-1, m), "parameter_place": (-1, sizes["parameter"]), "outlier_cable": (-1, m)}
     v.check_indices(data, ranges | dict.fromkeys(("row", "outlier_row", "left_out_row"), (0, sys.maxsize)))
     words: dict[str, Iterable[str]] = {
         "parameter_name": KINDS,
         "parameter_unit": UNITS,
-        "outlier_quantity": OUTLYING,
+        "outlier_quantity": QUANTITIES,
         "criticism_kind": KINDS,
         "criticism_moves": data.variables["parameter_label"].values.tolist(),
     }

@@ -19,7 +19,7 @@ from sagline.files.table import TABLE_LIMIT, csv_rows, line_error
 from sagline.files.yaml_text import YamlEntry
 
 ARRAYS: Final = (".npz", ".mat")  # files with arrays; their rows have the line numbers from 2
-_OF_CABLES: Final = ("length", "count", "load_cell")  # keys for one column of the file per cable
+_OF_CABLES: Final = ("length", "count", "load_cell", "swivel")  # keys for one column of the file per cable
 _VECTORS: Final = {"position": ("x", "y", "z"), "quaternion": ("qx", "qy", "qz", "qw")}  # keys for matrices
 _POSE: Final = ("pose", "time")  # columns that number the poses of a table with one row per cable
 _WITH_UNIT: Final = re.compile(r"(.*?)\s*\[(.*)\]")

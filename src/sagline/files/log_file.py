@@ -31,6 +31,7 @@ DEVIATIONS: Final = {
     "tension_deviation": "N",
     "position_deviation": "m",
     "rotation_deviation": "rad",
+    "swivel_deviation": "rad",
 }
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
@@ -38,11 +39,22 @@ _NEAR: Final = 0.7  # a word that is this similar to a key is a misspelt key; "n
 XYZ: Final = ("x", "y", "z")
 COMMANDED: Final = "_commanded"
 _MOST: Final = 1000  # largest number of cables
-_OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # columns that exist once per cable, and their units
-_NUMBERED = re.compile(rf"(count|length|load_cell)_([0-9]{{1,{len(str(_MOST))}}})")
+_OF_CABLE: Final = {
+    "count": "",
+    "length": "m",
+    "load_cell": "N",
+    "swivel": "rad",
+}  # columns that exist once per cable, and their units
+_BESIDE: Final = ("load_cell", "swivel")  # columns of cables beside counts or lengths
+_NUMBERED = re.compile(rf"(count|length|load_cell|swivel)_([0-9]{{1,{len(str(_MOST))}}})")
 _POSE_COLUMNS: Final = (*XYZ, *EULER, *QUATERNION)
 _MAPPED: Final = ("time", *_OF_CABLE, "position", "quaternion", "cable", "pose")  # other keys of a map of columns
-USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # standard deviations of the sensors
+USUAL: Final = {
+    "tension": "5 N",
+    "position": "1 mm",
+    "rotation": "1 mrad",
+    "swivel": "5 mrad",
+}  # standard deviations of the sensors
 
 
 class _Sensors(YamlEntry):
@@ -52,6 +64,7 @@ class _Sensors(YamlEntry):
     tension_deviation: Any = None
     position_deviation: Any = None
     rotation_deviation: Any = None
+    swivel_deviation: Any = None
     frame: PoseEntry | None = None
     target: Any = None
 
@@ -115,12 +128,12 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     header = next((line for line in text.split("\n") if line.strip()), "")
     cells = [cell.partition("[")[0].strip() for cell in header.replace('"', "").split(separator_of(text))]
     found = [_NUMBERED.fullmatch(column_of_cable(cell)) for cell in cells]
-    lengths = [match for match in found if match and match[1] != "load_cell"]
+    lengths = [match for match in found if match and match[1] in ("count", "length")]
     cables = max((min(int(match[2]), _MOST - 1) + 1 for match in lengths), default=1)
-    optional_units = {f"load_cell_{k}": "N" for k in range(cables)}
+    optional_units = {f"{kind}_{k}": _OF_CABLE[kind] for k in range(cables) for kind in _BESIDE}
     optional_units |= dict.fromkeys(XYZ, "m") | dict.fromkeys(EULER, "rad") | dict.fromkeys(QUATERNION, "")
     readings = {f"{kind}_{k}": _OF_CABLE[kind] for kind in ("count", "length") for k in range(cables)}
-    commanded = {name + COMMANDED: unit for name, unit in optional_units.items() if not name.startswith("load_cell")}
+    commanded = {name + COMMANDED: unit for name, unit in optional_units.items() if not name.startswith(_BESIDE)}
     units = {"time": "s", **readings, **optional_units, **commanded}
     table = CsvTable.read(path, text, units, gaps=frozenset((*readings, *optional_units)))
     kinds = [kind for kind in ("count", "length") if any(name in table.columns for name in _names(kind, cables))]
@@ -146,6 +159,7 @@ def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
         "counts": _stack_columns(table, _names("count", cables)),
         "unstrained_length": _stack_columns(table, _names("length", cables)),
         "load_cells": _stack_columns(table, _names("load_cell", cables), all_of_them=False),
+        "swivel": _stack_columns(table, _names("swivel", cables), all_of_them=False),
         "position": position,
         "rotation": _rotation(table, ""),
         "time": columns.get("time"),
@@ -227,6 +241,7 @@ def load_log(
     - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: lengths off the drums, in the controller's own
     values. `C0` and `L0` are other names of `count_0` and `length_0`.
     - `load_cell_0`, ...: tensions at the frame ends; cables without a load cell have no column.
+    - `swivel_0`, ...: swivel angles of the pulleys; their zeros are unknown.
     - `x`, `y`, `z` (or some of them): position of the target in the axes of the measuring system.
     - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): rotation of the
       platform in these axes. `beta` and `gamma` without `alpha` are pitch and roll, as an inclinometer measures them;
@@ -297,7 +312,12 @@ def read_log(
     given = given.replace(**deviations) if deviations else given
     table, cables = _read(path, rows)
     fields = _fields(table, cables)
-    for name, key in (("load_cells", "tension"), ("position", "position"), ("rotation", "rotation")):
+    for name, key in (
+        ("load_cells", "tension"),
+        ("position", "position"),
+        ("rotation", "rotation"),
+        ("swivel", "swivel"),
+    ):
         if fields[name] is not None and getattr(given, f"{key}_deviation") is None:
             wish = f"# {key}_deviation: {USUAL[key]}"
             step = f"Write a comment above the columns, for instance '{wish}', or give sensors (--{key}-deviation)."

@@ -101,6 +101,7 @@ def _kinds(found: Calibration) -> list[_Kind]:
         ("load cells", sensors.tension_deviation, slice(m, 2 * m), cables, "load cell"),
         ("positions", sensors.position_deviation, slice(2 * m, 2 * m + 3), axes, "position"),
         ("rotations", sensors.rotation_deviation, slice(2 * m + 3, 2 * m + 6), axes, "rotation"),
+        ("swivel angles", sensors.swivel_deviation, slice(2 * m + 6, 3 * m + 6), cables, "swivel angle"),
     )
     return [
         (label, found.residuals[:, where] / deviation, names, quantity)

@@ -104,7 +104,11 @@ def pose_residuals(found: Calibration, number: int) -> str:
     cables = f"<table><tr><th>cable</th><th>length</th><th></th><th>load cell</th><th></th></tr>{lines}</table>"
     places = "".join(
         f"<tr><td>{name}</td>{_cell(row[2 * m + axis], spread[2 * m + axis], unit)}</tr>"
-        for axis, (name, unit) in enumerate([(x, "m") for x in "xyz"] + [(f"about {x}", "rad") for x in "xyz"])
+        for axis, (name, unit) in enumerate(
+            [(x, "m") for x in "xyz"]
+            + [(f"about {x}", "rad") for x in "xyz"]
+            + [(f"swivel angle {k}", "rad") for k in range(len(row) - 2 * m - 6)]
+        )
         if np.isfinite(row[2 * m + axis])
     )
     measured = f"<table><tr><th>position</th><th>residual</th><th></th></tr>{places}</table>" if places else ""
