@@ -124,9 +124,8 @@ def inverse(
     load = _load_of(robots, pose, path, wrench)
     loads = np.atleast_2d(load)
     slanted = has_slanted_axes(robots)
-    reference, proves = None, stability and not slanted
-    if options is not None:
-        reference = _reference(shared, previous, tension.variable)
+    reference = None if options is None else _reference(shared, previous, tension.variable)
+    proves = stability and not slanted
 
     def solve(
         terms: RobotTerms, which: Indices | None = None, repeated: bool = False, swivels: Array | None = None

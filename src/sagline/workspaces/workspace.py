@@ -322,13 +322,11 @@ def workspace(
         docs/model.md, section 13; Bouchard, Gosselin & Moore 2010 (margin); Lorensen & Cline 1987 (marching cubes).
     """
     model, tension = model_of(model), method_of(tension)
-    asked = _checked(robot, criteria, tension)
-    report = callback(progress, "progress")
+    asked, report = _checked(robot, criteria, tension), callback(progress, "progress")
     region = region_of(robot, box, whole_number(cells, "cells", LEAST_CELLS, MOST_CELLS))
     turned = orientations_of(robot, orientations, region.box.tilt)
-    loads = load_of(wrenches)
+    loads, chosen = load_of(wrenches), choice(hull, "hull", get_args(Hull))
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
-    chosen = choice(hull, "hull", get_args(Hull))
     if is_underconstrained(robot):
         check_arguments(robot, turned, chosen, arm)
     held = check_given(robot, given)
@@ -339,9 +337,8 @@ def workspace(
     if components.count > 1:
         components = replace(components, separate=separated(components, exclusion(levels)))
     decided = levels.details(surface.vertices)
-    error = found.volume_error + uncertain_volume(levels, surface, decided.uncertainty, float(found.grid.step.max()))
+    uncertain = uncertain_volume(levels, surface, decided.uncertainty, float(found.grid.step.max()))
     on_box = _next_to(surface.vertices, region) & (decided.level > 1e-6)
-    flat = None if region.flat is None else AXES[region.flat]  # the faces of the slab around a plane are not open
     return Workspace(
         robot=robot,
         box=region.box,
@@ -354,13 +351,13 @@ def workspace(
         hull=chosen,
         unit=region.unit,
         volume=found.volume / region.thickness,
-        volume_error=error / region.thickness,
+        volume_error=(found.volume_error + uncertain) / region.thickness,
         components=replace(components, volume=locked(components.volume / region.thickness)),
         surface=surface,
         limiting=locked(np.where(on_box, BY_BOX, decided.criterion).astype(np.int8)),
         limiting_cable=locked(np.where(on_box, -1, decided.cable)),
         margin=decided.margin,
-        open_faces=tuple(face for face in found.open_faces if face[0] != flat),
+        open_faces=tuple(face for face in found.open_faces if region.flat is None or face[0] != AXES[region.flat]),
         x=found.grid.x,
         y=found.grid.y,
         z=found.grid.z,
