@@ -993,6 +993,7 @@ def _calibrations(given: _Given) -> dict[str, Call]:
         "position_deviation": ("array", np.full(3, 1e-3), True),
         "rotation_deviation": ("array", np.full(3, 1e-3), True),
         "swivel_deviation": ("array", np.full(8, 1e-3), True),
+        "frequency_deviation": ("array", np.full(6, 1e-3), True),
         "frame": ("one", given.pose, True),
         "target": ("array", [0.0, 0.0, 0.125]),
     }

@@ -78,9 +78,9 @@ def calibrate(
         log: Readings at poses at rest.
         unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s. "default"
             means frame anchors, length zeros, axial stiffness, mass and center of mass and, if they are read, gains and
-            biases of load cells and zeros of swivel angles; for straight cables, frame anchors and length zeros. None
-            is the same as "default" alone. With "clock_offset", the time by which lengths are late, moving rows with a
-            measured pose are also used, without their load cells.
+            biases of load cells, zeros of swivel angles, and the inertia for natural frequencies; for straight cables,
+            frame anchors and length zeros. None is the same as "default" alone. With "clock_offset", the time by which
+            lengths are late, moving rows with a measured pose are also used, without their load cells.
         model: Cable model, exact, without weight, or straight. With straight cables, poses are fitted to the lengths
             and to measured poses without a force balance. Load cells are not used, and rows in motion are used.
         robust: True to reduce the weight of poses that do not fit the other poses.
@@ -118,6 +118,7 @@ def calibrate(
     instance(log, WinchLog, "log")
     model = model_of(model)
     _check_model(robot, model)
+    _check_frequencies(robot, log)
     callback(progress, "progress")
     robust = flag(robust, "robust")
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
@@ -133,7 +134,7 @@ def calibrate(
     if timed and usable is not None:
         fit_log = _without_inertia(fit_log, usable[rows])
     if straight:
-        log, fit_log = (one.replace(load_cells=None, swivel=None) for one in (log, fit_log))
+        log, fit_log = (one.replace(load_cells=None, swivel=None, frequency=None) for one in (log, fit_log))
     if straight and fit_log.rotation is None:
         log, fit_log = _with_assumed_rotations(robot, model, log, fit_log, wanted)
     sensors = active_sensors(fit_log)
@@ -183,6 +184,7 @@ def active_sensors(log: WinchLog) -> Sensors:
             ("position_deviation", log.position),
             ("rotation_deviation", log.rotation),
             ("swivel_deviation", log.swivel),
+            ("frequency_deviation", log.frequency),
         )
         if read is None or np.isnan(read).all()
     }
@@ -199,6 +201,15 @@ def _check_model(robot: Robot, model: CableModel) -> None:
         raise InvalidValueError("winches: guides", "given", "None for calibrate", step)
 
 
+def _check_frequencies(robot: Robot, log: WinchLog) -> None:
+    """Reject more natural frequencies than degrees of freedom."""
+    n_modes = 0 if log.frequency is None else log.frequency.shape[1]
+    if n_modes > robot.degrees_of_freedom:
+        step = "Leave frequencies of cables out; only those of the platform on massless cables are predicted."
+        allowed = f"at most {robot.degrees_of_freedom}, one per degree of freedom"
+        raise InvalidValueError("log: frequency", counted(n_modes, "column"), allowed, step)
+
+
 def _geometric_start(
     problem: FitProblem, log: WinchLog, rows: Indices, unknowns: Sequence[Unknown]
 ) -> SearchState | None:
@@ -207,7 +218,7 @@ def _geometric_start(
     Without load cells, noise of the lengths makes cables slack at the reported lengths, and the search would end at one
     of several minima.
     """
-    asked = [one for one in unknowns if one.name not in (*OF_FORCES, "swivel_zero")]
+    asked = [one for one in unknowns if one.name not in (*OF_FORCES, "swivel_zero", "inertia")]
     try:
         found = calibrate(problem.robot, log, asked, model=Straight(), folds=0)
         at = dict(zip(found.parameters.labels, internal(found.parameters, found.values), strict=True))

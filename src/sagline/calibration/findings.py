@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.calibration.log import Sensors, reading_deviations
+from sagline.calibration.log import Sensors, count_of_frequencies, reading_deviations
 from sagline.calibration.observations import machine_of, unwhitened_slopes, winch_slopes
 from sagline.calibration.parameters import Parameters, internal, prior_root, prior_units, slopes_of_values, values_in
 from sagline.calibration.straight import whitened_errors
@@ -76,8 +76,8 @@ class Outlier(Result):
     Attributes:
         row: Row of the log.
         cable: Index of the cable, or None for the whole pose.
-        quantity: "length", "load cell", "position", "rotation" or "swivel angle".
-        size: Error [m, N or rad].
+        quantity: "length", "load cell", "position", "rotation", "swivel angle" or "frequency".
+        size: Error [m, N, rad or Hz].
         deviations: Error in standard deviations.
     """
 
@@ -116,7 +116,7 @@ class SensorDeviation(Result):
     """Standard deviation of a kind of sensor, or of one cable's sensor, computed from the residuals of a calibration.
 
     Attributes:
-        quantity: "length", "load cell", "position", "rotation" or "swivel angle".
+        quantity: "length", "load cell", "position", "rotation", "swivel angle" or "frequency".
         cable: Index of the cable, or None if all cables have the same standard deviation.
         stated: Standard deviation of `Sensors` [m, N or rad].
         found: Standard deviation from the residuals; NaN if the readings do not determine a value.
@@ -206,7 +206,7 @@ class Findings(Result):
         return locked(correlation)
 
 
-QUANTITIES: Final = ("length", "load cell", "position", "rotation", "swivel angle")
+QUANTITIES: Final = ("length", "load cell", "position", "rotation", "swivel angle", "frequency")
 FEWEST: Final = 10.0  # smallest redundancy of a group of readings for which there is an estimate
 LARGEST: Final = 0.3  # largest relative standard error of an estimate; otherwise there is no estimate
 GROSS: Final = 4.5  # standard deviations: a smaller error is not an outlier
@@ -223,14 +223,15 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
     The first estimate omits poses with outliers. Later estimates include poses with small outliers.
     """
     m = found.robot.cable_count
-    stated, ratios = reading_deviations(found.sensors, m), dict.fromkeys(QUANTITIES, 0.0)
+    modes = count_of_frequencies(found.sensors, m, found.residuals.shape[1])
+    stated, ratios = reading_deviations(found.sensors, m, modes), dict.fromkeys(QUANTITIES, 0.0)
     used = np.zeros(0, dtype=np.int64)
     for _ in range(ROUNDS):
         gross = [one.row for one in found.outliers if one.deviations > GROSS * ratios[one.quantity]]
         before, kept = used, np.flatnonzero(~np.isin(found.rows, gross))
         used = kept[evenly_spaced(len(kept), MOST)]
         read = ~np.isnan(found.residuals[used])
-        groups = [group for group in _groups(m, read.shape[1], per_cable=per_cable) if read[:, group[2]].any()]
+        groups = [group for group in _groups(m, modes, read.shape[1], per_cable=per_cable) if read[:, group[2]].any()]
         if len(groups) < 2:
             return ()
         if np.array_equal(before, used):
@@ -247,9 +248,9 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
     return tuple(deviations)
 
 
-def _groups(m: int, width: int, *, per_cable: bool) -> list[tuple[str, int | None, Indices]]:
-    """Quantity, cable and columns of each group of readings; width: number of all columns."""
-    ends = np.cumsum([0, m, m, 3, 3, width - 2 * m - 6])
+def _groups(m: int, modes: int, width: int, *, per_cable: bool) -> list[tuple[str, int | None, Indices]]:
+    """Quantity, cable and columns of each group of readings; width: number of columns; modes: of frequencies."""
+    ends = np.cumsum([0, m, m, 3, 3, width - 2 * m - 6 - modes, modes])
     found: list[tuple[str, int | None, Indices]] = []
     for k, name in enumerate(QUANTITIES):
         columns = np.arange(*ends[k : k + 2])
@@ -273,10 +274,10 @@ def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Arra
         slopes = winch_slopes(machine, lengths)
         rows, noise, misfit = whitened_errors(machine, slopes, pose_rows(found.poses)[used], found.residuals[used])
         return rows * scale, noise, misfit + rows * scale @ step, root
-    by_values, by_length = unwhitened_slopes(
-        found.robot, found.model, parameters, found.sensors, pose_rows(found.poses)[used], lengths
-    )
     residuals = found.residuals[used]
+    modes = count_of_frequencies(found.sensors, m, residuals.shape[1])
+    at = pose_rows(found.poses)[used], lengths, 0.0, 1.0, residuals[:, residuals.shape[1] - modes :] if modes else None
+    by_values, by_length = unwhitened_slopes(found.robot, found.model, parameters, found.sensors, *at)
     read = ~np.isnan(residuals[:, m:])
     slopes = by_values * slopes_of_values(found.robot, parameters) * scale * read[..., None]
     noise = np.concatenate((by_length, np.broadcast_to(np.eye(read.shape[1]), (*read.shape, read.shape[1]))), axis=2)

@@ -1,4 +1,4 @@
-"""Readings that the kernel does not know: swivel angles of pulleys; their predictions, derivatives and whitening.
+"""Swivel angles of pulleys and natural frequencies, which the kernel does not know: predictions and whitening.
 
 A reading depends on the pose of the platform and on the parameters. The derivatives of the pose follow from the force
 balance by the implicit function theorem. The readings are added to the whitened readings of the kernel like the
@@ -7,20 +7,29 @@ measurements of a later time in a Kalman filter; see docs/model.md, section 14.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.core.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices, locked
+from sagline.kernels import tables
 from sagline.kernels.calibration import kinds
+from sagline.kernels.forward.forward import forward_poses
+from sagline.kernels.forward.platform import ForwardTerms
+from sagline.kernels.memory import memory_for
+from sagline.kinematics.forward_rows import ForwardRows, new_chain
 from sagline.robot.robot import Robot
+from sagline.statics.slopes import KernelStates
+from sagline.statics.stiffness import natural_frequency
+from sagline.statics.tables import body_table, cable_table
 
 
 class FurtherReadings(NamedTuple):
     """Readings at N poses."""
 
     swivels: Array | None  # swivel angles [rad], (N, m), NaN if missing; None for readings that equal the predictions
+    frequencies: Array | None  # natural frequencies [Hz], (N, K), NaN if missing; None without frequencies
 
 
 class FurtherRows(NamedTuple):
@@ -86,6 +95,127 @@ def swivel_rows(
     if readings is not None:
         residual = wrapped(readings - swivel_angles(robot, poses) - zeros)
     return FurtherRows(residual, slopes, by_length)
+
+
+LENGTH_STEP: Final = 1e-6  # step of the true lengths for difference quotients of frequencies [m]
+_CABLE_COLUMNS: Final = (  # first row of `kinds`, column of the cable_table, number of components
+    (kinds.FRAME, tables.FRAME_X, 3),
+    (kinds.PLATFORM, tables.PLATFORM_X, 3),
+    (kinds.DENSITY, tables.DENSITY, 1),
+    (kinds.STIFFNESS, tables.STIFFNESS, 1),
+    (kinds.RADIUS, tables.PULLEY_RADIUS, 1),
+    (kinds.DEAD, tables.DEAD_CABLE, 1),
+)
+_BODY_COLUMNS: Final = ((kinds.MASS, tables.MASS, 1), (kinds.CENTER, tables.CENTER_X, 3))
+
+
+class PlatformArrays(NamedTuple):
+    """Robots and states of B samples, for the computation of natural frequencies."""
+
+    cables: Array  # cable_table, (B, m, CABLE_COLUMNS)
+    bodies: Array  # body_table, (B, BODY_COLUMNS)
+    inertia: Array  # about the center of mass, platform frame [kg m^2], (B, 3, 3)
+    poses: Array  # pose rows, (B, POSE_COLUMNS)
+    lengths: Array  # true lengths [m], (B, m)
+
+
+def natural_frequencies(terms: ForwardTerms, freedom: Array, at: PlatformArrays) -> Array:
+    """Natural frequencies (B, n) [Hz] of platforms on massless cables, ascending; NaN for an unstable motion."""
+    (count, m), size = at.lengths.shape, tables.RESULT_ROWS if terms[-1] else tables.BARE_ROWS
+    robots, memory = (freedom, locked(at.bodies), locked(at.cables)), memory_for(m)
+    found = ForwardRows(
+        np.empty((count, tables.POSE_COLUMNS)),
+        np.empty((size, count, m)),
+        np.empty((count, m), dtype=np.int8),
+        np.empty((count, tables.FORWARD_NUMBERS)),
+        np.empty(count, dtype=np.int8),
+    )
+    given = (*robots, locked(at.lengths), locked(at.poses), locked(np.zeros((1, 6))))
+    forward_poses(terms, False, given, new_chain(m, len(freedom)), memory, found.arrays)
+    matrix = KernelStates.of_rows(terms, robots, locked(found.poses), found.results).describe().found[0]
+    matrix = np.where(found.stable[:, None, None], matrix, np.nan)
+    turn, mass = Rotation.from_quat(found.poses[:, 3:]).as_matrix(), np.zeros((count, 6, 6))
+    mass[:, :3, :3] = at.bodies[:, tables.MASS, None, None] * np.eye(3)
+    mass[:, 3:, 3:] = turn @ at.inertia @ np.swapaxes(turn, 1, 2)
+    inverse = np.linalg.inv(np.linalg.cholesky(freedom @ mass @ freedom.T))
+    scaled = inverse @ (freedom @ (0.5 * (matrix + np.swapaxes(matrix, 1, 2))) @ freedom.T) @ np.swapaxes(inverse, 1, 2)
+    lost = np.asarray(np.isnan(scaled).any(axis=(1, 2), keepdims=True))
+    return np.where(lost[..., 0], np.nan, natural_frequency(np.linalg.eigvalsh(np.where(lost, 0.0, scaled))))
+
+
+def frequency_rows(
+    robot: Robot,
+    terms: ForwardTerms,
+    readings: Array,
+    poses: Array,
+    lengths: Array,
+    where: Indices,
+    scale: Array,
+    paid: Array,
+    steps: Array,
+) -> FurtherRows:
+    """Residuals and derivatives of the K lowest natural frequencies, matched with the readings by their order.
+
+    The derivatives are central differences between equilibria. paid: derivatives of the lengths by the parameters
+    (N, m, P). steps: of the P parameters. Other arguments: as in `swivel_rows`.
+    """
+    (count, modes), m, width = readings.shape, lengths.shape[1], paid.shape[2]
+    rows = np.flatnonzero(~np.isnan(readings).all(axis=1) & np.isfinite(lengths).all(axis=1))
+    found = FurtherRows(np.full((count, modes), np.nan), np.zeros((count, modes, width)), np.zeros((count, modes, m)))
+    if not rows.size:
+        return found
+    sizes = np.concatenate((steps, np.full(m, LENGTH_STEP)))
+    longer = np.concatenate((paid, np.broadcast_to(np.eye(m), (count, m, m))), axis=2)[rows] * sizes
+    samples = len(rows) * (1 + 2 * len(sizes))
+    longer = np.concatenate((np.zeros((len(rows), m, 1)), longer, -longer), axis=2).transpose(2, 0, 1).reshape(-1, m)
+    at = PlatformArrays(
+        np.tile(cable_table(robot), (samples, 1, 1)),
+        np.tile(body_table(robot), (samples, 1)),
+        np.tile(robot.inertia, (samples, 1, 1)),
+        np.tile(poses[rows], (1 + 2 * len(sizes), 1)),
+        np.tile(lengths[rows], (1 + 2 * len(sizes), 1)) + longer,
+    )
+    _change_data(robot, at, where, scale, steps, len(rows), len(sizes))
+    values = natural_frequencies(terms, robot.freedom, at)[:, :modes].reshape(1 + 2 * len(sizes), len(rows), modes)
+    slopes = (values[1 : 1 + len(sizes)] - values[1 + len(sizes) :]) / (2.0 * sizes[:, None, None])
+    found.residual[rows] = readings[rows] - values[0]
+    found.slopes[rows] = slopes[:width].transpose(1, 2, 0)
+    found.by_length[rows] = slopes[width:].transpose(1, 2, 0)
+    return found
+
+
+def second_moments(inertia: Array) -> Array:
+    """Second moments of the mass (3, 3) [kg m^2] from the inertia (3, 3), both about the center of mass."""
+    return np.asarray(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+
+
+def with_inertia(robot: Robot, change: Array) -> Robot:
+    """Robot with changed inertia. change: logarithms of factors of the second moments of the mass, (3,)."""
+    factors = np.exp(0.5 * change)
+    second = factors[:, None] * second_moments(robot.inertia) * factors
+    return robot.replace(inertia=np.trace(second) * np.eye(3) - second)
+
+
+def _change_data(
+    robot: Robot, at: PlatformArrays, where: Indices, scale: Array, steps: Array, rows: int, count: int
+) -> None:
+    """Change the data of the samples, which are `rows` without a change, then with positive and negative steps."""
+    for table, columns in ((at.cables, _CABLE_COLUMNS), (at.bodies[:, None], _BODY_COLUMNS)):
+        for first, column, components in columns:
+            for axis in range(components):
+                for i in range(table.shape[1]):
+                    q = int(where[first + axis, i])
+                    for sign, begin in ((1.0, 1), (-1.0, 1 + count)) if q >= 0 else ():
+                        part = slice((begin + q) * rows, (begin + q + 1) * rows)
+                        table[part, i, column + axis] += sign * steps[q] * scale[first + axis, i]
+    moments = second_moments(robot.inertia)
+    for axis in range(3):
+        q = int(where[kinds.INERTIA + axis, 0])
+        half = np.zeros((3, 3))
+        half[axis] = 0.5 * steps[q] * scale[kinds.INERTIA + axis, 0] * moments[axis]
+        change = np.trace(half + half.T) * np.eye(3) - (half + half.T)
+        for sign, begin in ((1.0, 1), (-1.0, 1 + count)) if q >= 0 else ():
+            at.inertia[(begin + q) * rows : (begin + q + 1) * rows] += sign * change
 
 
 def wrapped(angles: Array) -> Array:

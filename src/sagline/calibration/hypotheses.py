@@ -145,7 +145,7 @@ class Trial:
         read_at = self.rows + late + change.behind  # either `late` or `behind` is zero
         rows = self.rows[(read_at >= 0) & (read_at < len(log))]
         rows = rows[evenly_spaced(len(rows), most)]
-        given = readings_table(log.rows(rows))._replace(swivels=None)
+        given = readings_table(log.rows(rows))._replace(swivels=None, frequencies=None)
         read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows + change.behind], change.lengths)
         if log.load_cells is not None:
             cells = CELL_UNITS[change.cell_unit] * log.load_cells[rows + late]

@@ -191,6 +191,7 @@ STEPS: Final = {  # kind of parameter: measurement of the kind; easy measurement
     "load_cell_gain": "check the load cell with a known weight",
     "axial_stiffness": "choose poses with very different tensions, or measure the stretch of a piece of the cable",
     "center_of_mass": "balance the platform, or choose poses with more tilt",
+    "inertia": "swing the platform on two ropes",
     "platform_anchors": "measure the platform's anchors",
     "swivel_zero": "read a swivel angle at a pose that is measured",
     "length_scale": "pay out a length along a tape",
@@ -300,6 +301,7 @@ def symmetries(
     matters[kinds.PER_CABLE : kinds.SCALE, 1:] = False
     # The pose of the measuring system and the target may change: a few measured points do not determine them.
     matters[kinds.SHIFT : kinds.SCALE] = False
+    matters[kinds.INERTIA :] = False
     if sensors.swivel_deviation is None:
         matters[kinds.SWIVEL] = False
     if sensors.tension_deviation is None:

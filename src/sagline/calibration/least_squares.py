@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.special import chdtri
 
-from sagline.calibration.log import Sensors, reading_deviations
+from sagline.calibration.log import Sensors, count_of_frequencies, reading_deviations
 from sagline.calibration.observations import BLOCK, NO_LOAD, MachineTerms, WhitenedRows, whitened_rows
 from sagline.calibration.parameters import left_jacobian
 from sagline.calibration.problem import Evaluated, Fit, FitProblem, Normal, SearchState
@@ -74,7 +74,7 @@ def whitened_at(
 def _squares_of(sensors: Sensors, rows: WhitenedRows, reported: Array, lengths: Array) -> tuple[Array, Indices]:
     """Sum of squared residuals of each pose, in standard deviations, and number of readings of each pose."""
     m = reported.shape[1]
-    deviation = reading_deviations(sensors, m)
+    deviation = reading_deviations(sensors, m, count_of_frequencies(sensors, m, m + rows.residual.shape[1]))
     misses = rows.residual / deviation[m:]
     there = ~np.isnan(rows.residual)
     squares = np.sum(np.where(there, misses, 0.0) ** 2, axis=1)

@@ -66,6 +66,8 @@ class Sensors(_Replaceable):
             the rotations in a log has no effect.
         swivel_deviation: Standard deviation of the measured swivel angle of a pulley [rad], > 0, shape () or (m,); None
             without such sensors.
+        frequency_deviation: Standard deviation of a measured natural frequency [Hz], > 0, shape () or (K,); None if
+            frequencies are not measured.
         frame: Pose of the measuring system in the world; None for the axes of the world. If p are the measured
             coordinates of a point, its world coordinates are frame.position + frame.matrix p.
         target: The measured point of the platform, in the platform frame [m], shape (3,).
@@ -89,12 +91,15 @@ class Sensors(_Replaceable):
     swivel_deviation: Array | None = field(
         default=None, kw_only=True, converter=if_known, metadata=rule("rad", above=0.0)
     )
+    frequency_deviation: Array | None = field(
+        default=None, kw_only=True, converter=if_known, metadata=rule("Hz", above=0.0)
+    )
     frame: Pose = field(default=None, kw_only=True, converter=_world_if_none)
     target: Array = field(default=(0.0, 0.0, 0.0), kw_only=True, converter=given)
 
     def __attrs_post_init__(self) -> None:
         """Check every field once."""
-        for about in fields(Sensors)[:5]:
+        for about in fields(Sensors)[:6]:
             if (value := getattr(self, about.name)) is not None or about.default is not None:
                 own = checked(value, about.name, **about.metadata)
                 axes = 3 if about.name in ("position_deviation", "rotation_deviation") else None
@@ -114,10 +119,10 @@ def measures_yaw(sensors: Sensors) -> bool:
     return sensors.rotation_deviation is not None and bool(np.isfinite(sensors.rotation_deviation).all())
 
 
-def reading_deviations(sensors: Sensors, cables: int) -> Array:
+def reading_deviations(sensors: Sensors, cables: int, frequencies: int = 0) -> Array:
     """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite for a missing sensor.
 
-    With swivel angles, their deviations (m,) follow.
+    With swivel angles, their deviations (m,) follow, then those of the measured natural frequencies.
     """
     parts = [
         (sensors.length_deviation, cables),
@@ -126,7 +131,13 @@ def reading_deviations(sensors: Sensors, cables: int) -> Array:
         (sensors.rotation_deviation, 3),
     ]
     parts += [] if sensors.swivel_deviation is None else [(sensors.swivel_deviation, cables)]
+    parts += [(sensors.frequency_deviation, frequencies)] if frequencies else []
     return np.concatenate([np.broadcast_to(np.inf if part is None else part, (size,)) for part, size in parts])
+
+
+def count_of_frequencies(sensors: Sensors, cables: int, width: int) -> int:
+    """Number of natural frequencies K among `width` columns of lengths and readings."""
+    return width - 2 * cables - 6 - (0 if sensors.swivel_deviation is None else cables)
 
 
 def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
@@ -134,7 +145,8 @@ def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
     return (1.0, 0.0) if robot.winches is None else (robot.winches.load_cell_gain, robot.winches.load_cell_bias)
 
 
-_BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "swivel", "time", "commanded")
+_TABLES = ("counts", "unstrained_length", "load_cells", "position", "rotation", "swivel", "frequency")
+_BY_ROW = (*_TABLES, "time", "commanded")
 _UNIT = 1e-6  # allowed error of a quaternion's norm; quaternions that were printed with seven digits are accepted
 
 
@@ -157,6 +169,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
         sensors: Standard deviations of all readings; None for `Sensors()`, which contains only lengths.
         swivel: Measured swivel angles of the pulleys [rad], relative to unknown zeros, shape (N, m), NaN if missing; or
             None. The angle is the direction of the cable about its swivel axis, 0 along x.
+        frequency: Lowest natural frequencies of the platform [Hz], ascending, shape (N, K), NaN if missing; or None.
         source: Text that states the origin of the readings, such as a file name.
 
     Raises:
@@ -188,6 +201,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
         "@_commanded=commanded.position",
         "q@_commanded=commanded.quaternion",
         "swivel_#=swivel",
+        "frequency_#=frequency",
     )
 
     counts: Array | None = field(default=None, converter=if_known)
@@ -200,6 +214,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
     sensors: Sensors = field(default=None, converter=_default_if_none)
     source: str = ""
     swivel: Array | None = field(default=None, kw_only=True, converter=if_known)
+    frequency: Array | None = field(default=None, kw_only=True, converter=if_known)
 
     def __attrs_post_init__(self) -> None:
         """Check every field once, and check that the fields are consistent."""
@@ -212,6 +227,8 @@ class WinchLog(_Replaceable, Saved, Tabular):
             if (value := getattr(self, name)) is not None:
                 table = _table(value, name, unit_, n, columns)
                 object.__setattr__(self, name, _quaternions(table) if name == "rotation" else table)
+        if self.frequency is not None:
+            object.__setattr__(self, "frequency", _ascending(_table(self.frequency, "frequency", "Hz", n, None)))
         if self.time is not None:
             time = checked(self.time, "time", "s")
             if time.shape != (n,):
@@ -303,6 +320,7 @@ class WinchLog(_Replaceable, Saved, Tabular):
             (self.position, "measured coordinate", "measured coordinates"),
             (None if self.rotation is None else self.rotation[:, 0], f"measured {turned}", f"measured {turned}s"),
             (self.swivel, "swivel angle", "swivel angles"),
+            (self.frequency, "natural frequency", "natural frequencies"),
         ):
             if values is not None:
                 count = np.count_nonzero(~np.isnan(values))
@@ -351,6 +369,16 @@ def _quaternions(given: Array) -> Array:
     return locked(found)
 
 
+def _ascending(frequency: Array) -> Array:
+    """Checked frequencies (N, K): positive, and ascending in each row apart from missing values."""
+    before = np.fmax.accumulate(np.where(np.isnan(frequency), 0.0, frequency), axis=1)
+    before = np.hstack((np.zeros((len(frequency), 1)), before[:, :-1]))
+    for row, k in np.argwhere(frequency <= before)[:1].tolist():
+        value, step = f"{frequency[row, k]:.6g} Hz", "Order the frequencies of each row; leave a missing one blank."
+        raise InvalidValueError(f"frequency[{row}, {k}]", value, f"> {before[row, k]:.6g} Hz, the one before it", step)
+    return frequency
+
+
 def _check_sensors(log: WinchLog, cables: int) -> None:
     """Reject readings without a standard deviation, and standard deviations for a wrong number of cables."""
     pairs = (
@@ -359,6 +387,7 @@ def _check_sensors(log: WinchLog, cables: int) -> None:
         ("position_deviation", log.position, 3),
         ("rotation_deviation", log.rotation, 3),
         ("swivel_deviation", log.swivel, cables),
+        ("frequency_deviation", log.frequency, 0 if log.frequency is None else log.frequency.shape[1]),
     )
     names = {"tension_deviation": "load_cells"}
     for name, read, size in pairs:

@@ -9,9 +9,9 @@ import numpy as np
 
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel
-from sagline.calibration.further import FurtherReadings, swivel_rows, whitened_further
+from sagline.calibration.further import FurtherReadings, FurtherRows, frequency_rows, swivel_rows, whitened_further
 from sagline.calibration.log import Sensors, load_cells_of, measures_yaw, reading_deviations
-from sagline.calibration.parameters import Parameters, slopes_of_values
+from sagline.calibration.parameters import KINDS, Parameters, slopes_of_values
 from sagline.core.arrays import Array, kernel_input, locked
 from sagline.core.progress import blocks
 from sagline.kernels.calibration import kinds
@@ -28,6 +28,8 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 STEP: Final = 1e-4  # relative step of a drum radius or length zero for difference quotients; lengths are nearly linear
 # length_zero, drum_radius, axial_stiffness, length_scale and clock_offset, as in `kernels.calibration.observe`
 SLOPES: Final = 5
+LENGTH_KINDS: Final = (kinds.ZERO, kinds.DRUM, kinds.STIFFNESS, kinds.SCALE, kinds.CLOCK)  # the same as rows of `kinds`
+FREQUENCY_STEP: Final = 1e-5  # step of difference quotients of frequencies, relative to deviations of unknown values
 BLOCK: Final = 1 << 9  # number of poses per kernel call; its work arrays take about 10 MB
 EXACT: Final = 1e-10  # [m], standard deviation of lengths that is too small to affect the whitening
 POSE_SENSORS: Final = Sensors(EXACT, 1.0, 1.0, 1.0)  # pose of the platform in the world, with deviations of 1
@@ -58,15 +60,16 @@ def _known_field(of: Winch | Cable, name: str) -> Array:
 class WhitenedRows(NamedTuple):
     """Whitened observations at N equilibria: the rows are independent, each with a standard deviation of 1.
 
-    The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured; with swivel angles, m
-    more.
+    The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured; with further
+    readings, more.
     """
 
     # Derivatives by the internal parameters, (N, R, P), after elimination of the true lengths. Rows without a reading
     # are zero. Where `logarithmic` is True, the internal parameter is the logarithm.
     matrix: Array
     misfit: Array  # readings minus predictions, (N, R)
-    residual: Array  # residuals [N, m, rad] at the given lengths, (N, m + 6 or 2 m + 6); NaN if missing
+    # residuals [N, m, rad, Hz] at the given lengths, (N, m + 6), and with further readings more; NaN if missing
+    residual: Array
     back: Array  # change of the true lengths [m] per unit of misfit, (N, m, R)
     # Motion of the platform's center of mass [m, rad], world axes, (N, m + 1, 6). Each of the first m rows is the
     # motion per unit of a true length. The last row is the motion for a step along a direction. Without a direction, it
@@ -229,8 +232,20 @@ def _with_further(
     motion = moves.matrix[:, m:], np.swapaxes(moves.back, 1, 2)[:, m:] / EXACT**2
     factor = machine.slopes if direction is None else machine.slopes * direction
     scale, places = np.where(where >= 0, factor[where], 0.0), where if direction is None else np.minimum(where, 0)
-    rows = swivel_rows(machine.robot, machine.swivel_zero, further.swivels, poses, places, scale, motion)
-    deviation, given = reading_deviations(sensors, m), np.broadcast_to(sensors.length_deviation, m)
+    parts, modes = [], 0
+    if sensors.swivel_deviation is not None:
+        swivels = machine.swivel_zero, further.swivels
+        parts.append(swivel_rows(machine.robot, *swivels, poses, places, scale, motion))
+    if further.frequencies is not None:
+        modes, paid = further.frequencies.shape[1], np.zeros((len(poses), m, motion[0].shape[2]))
+        for row, change in zip((*LENGTH_KINDS,), slopes, strict=True):
+            for i in np.flatnonzero(places[row] >= 0):
+                paid[:, i, places[row, i]] += scale[row, i] * change[:, i]
+        at = poses, lengths, places, scale, paid
+        steps = _steps(machine) if direction is None else 1.0 / np.abs(direction / _steps(machine)).max(keepdims=True)
+        parts.append(frequency_rows(machine.robot, machine.terms, further.frequencies, *at, steps))
+    rows = FurtherRows(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
+    deviation, given = reading_deviations(sensors, m, modes), np.broadcast_to(sensors.length_deviation, m)
     off = readings.lengths - lengths
     more = whitened_further(rows, deviation[2 * m + 6 :], off, given**2, (found.matrix, found.misfit, found.back))
     return found._replace(
@@ -239,6 +254,11 @@ def _with_further(
         back=np.concatenate((found.back, more[2]), axis=2),
         residual=np.concatenate((found.residual, rows.residual), axis=1),
     )
+
+
+def _steps(machine: MachineTerms) -> Array:
+    """Steps (P,) of the internal parameters for difference quotients of frequencies."""
+    return np.array([KINDS[name].assumed for name in machine.parameters.names]) * FREQUENCY_STEP
 
 
 def _no_readings(lengths: Array) -> PoseReadings:
@@ -294,13 +314,16 @@ def predicted_rows(
     lengths: Array,
     offset: Array | float = 0.0,
     scale: Array | float = 1.0,
+    frequencies: Array | None = None,
 ) -> WhitenedRows:
     """Whitened slopes of the readings at equilibria with pose rows `poses` and unstrained lengths (N, m) [m].
 
-    offset [m], scale: of the reported lengths, each (m,) or one number.
+    offset [m], scale: of the reported lengths, each (m,) or one number. frequencies: (N, K), NaN where no slopes are
+    wanted, or None.
     """
     machine = machine_of(robot, model, parameters, sensors, offset, scale)
-    further = None if sensors.swivel_deviation is None else FurtherReadings(None)
+    more = sensors.swivel_deviation is not None or frequencies is not None
+    further = FurtherReadings(None, frequencies) if more else None
     slopes, readings = winch_slopes(machine, lengths), _no_readings(lengths)
     rows = whitened_rows(machine, readings, slopes, poses, lengths, further=further)
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
@@ -309,8 +332,9 @@ def predicted_rows(
 def unit_sensors(sensors: Sensors) -> Sensors:
     """Sensors for all readings, each with a standard deviation of 1 in SI units, and with exact lengths."""
     rotation = [1.0, 1.0, 1.0 if sensors.rotation_deviation is None or measures_yaw(sensors) else np.inf]
-    swivel = None if sensors.swivel_deviation is None else 1.0
-    return Sensors(EXACT, 1.0, 1.0, rotation, swivel_deviation=swivel, frame=sensors.frame, target=sensors.target)
+    more = [None if deviation is None else 1.0 for deviation in (sensors.swivel_deviation, sensors.frequency_deviation)]
+    further = {"swivel_deviation": more[0], "frequency_deviation": more[1]}
+    return Sensors(EXACT, 1.0, 1.0, rotation, **further, frame=sensors.frame, target=sensors.target)
 
 
 def unwhitened_slopes(
@@ -322,16 +346,18 @@ def unwhitened_slopes(
     lengths: Array,
     offset: Array | float = 0.0,
     scale: Array | float = 1.0,
+    frequencies: Array | None = None,
 ) -> tuple[Array, Array]:
     """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths.
 
-    With swivel angles, their derivatives follow in m more rows.
+    The derivatives of swivel angles follow in m more rows, then those of frequencies (N, K), if given.
     """
     (count, m), sensors = lengths.shape, unit_sensors(sensors)
-    width = len(reading_deviations(sensors, m)) - m
+    width = len(reading_deviations(sensors, m, 0 if frequencies is None else frequencies.shape[1])) - m
     by_values, by_length = np.empty((count, width, len(parameters.names))), np.empty((count, width, m))
     for part in blocks(count, BLOCK):
-        rows = predicted_rows(robot, model, parameters, sensors, poses[part], lengths[part], offset, scale)
+        at = poses[part], lengths[part], offset, scale, None if frequencies is None else frequencies[part]
+        rows = predicted_rows(robot, model, parameters, sensors, *at)
         by_values[part] = rows.matrix / slopes_of_values(robot, parameters)
         by_length[part] = np.swapaxes(rows.back, 1, 2) / EXACT**2
     return by_values, by_length

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -62,6 +63,12 @@ class _Case(NamedTuple):
     lengths: Array  # true lengths [m], (1, m)
     read: Flags  # flags of the available readings, (m + 6,)
     further: FurtherReadings | None  # readings that the kernel does not know; (m,) more of all arrays of readings
+
+    @property
+    def modes(self) -> int:
+        """Number of natural frequencies."""
+        given = None if self.further is None else self.further.frequencies
+        return 0 if given is None else given.shape[1]
 
     def misses(self) -> tuple[Array, Array]:
         """Misfits (2 m + 6,) of lengths and readings, and derivatives (m + 6, m) of readings by true lengths.
@@ -181,8 +188,9 @@ def outliers_in(
     """
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = problem.reported_lengths(machine)
-    deviation = reading_deviations(machine.sensors, m)
-    more = [] if log.swivels is None else [log.swivels]
+    modes = 0 if log.frequencies is None else log.frequencies.shape[1]
+    deviation = reading_deviations(machine.sensors, m, modes)
+    more = [read for read in (log.swivels, log.frequencies) if read is not None]
     read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3], *more))) & np.isfinite(deviation[m:])
     exact = observations.unit_sensors(machine.sensors)
     parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), exact, counted=False)  # not used
@@ -206,8 +214,11 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
     for quantity, first in (("position", m), ("rotation", m + 3)):
         if (own := np.flatnonzero(case.read[first : first + 3])).size:
             suspects.append(_Suspect(quantity, None, m + first + own))
-    swivels = np.flatnonzero(case.read[m + 6 :]).tolist()
+    last = len(case.deviation) - case.modes
+    swivels = np.flatnonzero(case.read[m + 6 : last - m]).tolist()
     suspects += [_Suspect("swivel angle", cable, np.array([2 * m + 6 + cable])) for cable in swivels]
+    modes = np.flatnonzero(case.read[last - m :]).tolist()
+    suspects += [_Suspect("frequency", None, np.array([last + k])) for k in modes]
     taken: list[_Suspect] = []
     before = whole.squares
     for _ in range(_MOST):
@@ -239,7 +250,8 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
             each = zip(taken, fits[best].sizes, fits[best].deviations, strict=True)
             return [Outlier(row, one.cable, one.quantity, size, many) for one, size, many in each]
     off, _ = case.misses()
-    parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6), slice(2 * m + 6, None))
+    ends = np.cumsum([0, m, m, 3, 3, last - 2 * m - 6, case.modes]).tolist()
+    parts = [slice(first, end) for first, end in pairwise(ends)]
     worst = int(np.argmax([float(np.nansum((off[part] / case.deviation[part]) ** 2)) for part in parts]))
     size = float(np.sqrt(np.nansum(off[parts[worst]] ** 2)))
     return [Outlier(row, None, QUANTITIES[worst], size, float(np.sqrt(whole.squares)))]

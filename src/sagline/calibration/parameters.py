@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from sagline.calibration.further import with_inertia
 from sagline.calibration.log import Sensors, measures_yaw
 from sagline.core.arguments import choice, elements, flag, instance
 from sagline.core.arrays import Array, Flags, Indices, exactly, locked
@@ -54,6 +55,7 @@ KINDS: Final[dict[str, Kind]] = {
     "load_cell_bias": Kind("winches", "N", kinds.BIAS, _ONE, True, False, False, 20.0, 100.0, "load cells"),
     "mass": Kind("robot", "kg", kinds.MASS, _ONE, False, False, True, 0.05, 0.2),
     "center_of_mass": Kind("robot", "m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
+    "inertia": Kind("system", "", kinds.INERTIA, _XYZ, False, False, False, 0.2, 1.0, "frequencies"),
     "measuring_frame": Kind("system", "m", kinds.SHIFT, _SIX, False, False, False, 10.0, 10.0, "positions"),
     "length_scale": Kind("system", "", kinds.SCALE, _ONE, True, False, False, 0.02, 0.1, "lengths"),
     "clock_offset": Kind("system", "s", kinds.CLOCK, _ONE, True, True, False, 0.1, 1.0, "motion"),
@@ -132,11 +134,12 @@ DEFAULT: Final = "default"  # in a list of unknowns, it means the default unknow
 
 
 def _default_unknowns(sensors: Sensors, *, straight: bool) -> tuple[str, ...]:
-    """Default unknowns, with those of load cells and swivel angles if `sensors` has them; `straight`: no forces."""
+    """Default unknowns, with those of further readings if `sensors` has them; `straight`: no forces."""
     if straight:
         return UNKNOWNS[:2]
     cells = () if sensors.tension_deviation is None else OF_CELLS
-    return (*UNKNOWNS, *cells, *(() if sensors.swivel_deviation is None else ("swivel_zero",)))
+    further = [("swivel_zero", sensors.swivel_deviation), ("inertia", sensors.frequency_deviation)]
+    return (*UNKNOWNS, *cells, *(name for name, deviation in further if deviation is not None))
 
 
 _NOTHING: Final = {"dead_cable": "0 m", "pulley_radius": "0 m"}
@@ -196,6 +199,8 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
     m, kind = robot.cable_count, KINDS[name]
     if name == "measuring_frame":
         return np.concatenate((sensors.frame.position, np.zeros(3)))[None]
+    if name == "inertia":
+        return np.zeros((1, 3))
     if name == "target":
         return np.asarray(sensors.target)[None]
     if name in ("length_scale", "clock_offset", "swivel_zero") or (name == "length_zero" and not counted):
@@ -225,6 +230,7 @@ def is_observed(kind: Kind, sensors: Sensors, counted: bool) -> bool:
         "lengths": not counted,
         "motion": False,  # `calibrate` checks the times of a log
         "load cells": sensors.tension_deviation is not None,
+        "frequencies": sensors.frequency_deviation is not None,
         "swivel angles": sensors.swivel_deviation is not None,
         "positions": sensors.position_deviation is not None or measures_yaw(sensors),
     }[kind.needs]
@@ -240,6 +246,7 @@ def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: K
         "lengths": "Give lengths in place of counts, or leave it out; drum_radius is the scale of counts.",
         "load cells": "Add load cells to the log, or give a prior: Unknown(name, deviation=...); or leave it out.",
         "positions": "Add measured positions to the log, or leave it out.",
+        "frequencies": "Add natural frequencies to the log, or leave it out.",
         "swivel angles": "Add swivel angles to the log, or leave it out.",
     }[kind.needs]
     raise InvalidValueError(f"unknown: {unknown.name}", "observed by no reading", f"{kind.needs} in the log", add)
@@ -326,7 +333,10 @@ def quantities_of(parameters: Parameters, numbers: Array) -> dict[str, Array]:
 
 def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
     """Robot with the parameter values `values` (P,); raises an error if a value is invalid."""
-    return with_quantities(robot, quantities_of(parameters, values))
+    changed = with_quantities(robot, quantities_of(parameters, values))
+    if "inertia" not in parameters.names:
+        return changed
+    return with_inertia(changed, values[parameters.where[kinds.INERTIA : kinds.INERTIA + 3, 0]])
 
 
 def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sensors:

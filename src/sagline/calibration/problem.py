@@ -58,6 +58,7 @@ class ReadingsTable(NamedTuple):
     # speed [m/s] and acceleration [m/s^2] of the reported lengths, (2, N, m); None if clock_offset is not estimated
     motion: Array | None = None
     swivels: Array | None = None  # swivel angles [rad], (N, m), or None
+    frequencies: Array | None = None  # natural frequencies [Hz], (N, K), or None
 
 
 def readings_table(log: WinchLog) -> ReadingsTable:
@@ -65,8 +66,9 @@ def readings_table(log: WinchLog) -> ReadingsTable:
     count, m = log.readings.shape
     columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
     tables = (np.broadcast_to(np.nan, (count, width)) if read is None else read for read, width in columns)
+    further = {"swivels": log.swivel, "frequencies": log.frequency}
     cells, positions, rotations = tables
-    return ReadingsTable(log.counts, log.unstrained_length, cells, positions, rotations, None, log.swivel)
+    return ReadingsTable(log.counts, log.unstrained_length, cells, positions, rotations, **further)
 
 
 class FitProblem(NamedTuple):
@@ -113,7 +115,10 @@ class FitProblem(NamedTuple):
 
     def further(self, part: slice) -> FurtherReadings | None:
         """Readings at the poses `part` that the kernel does not know; None without such readings."""
-        return None if self.log.swivels is None else FurtherReadings(self.log.swivels[part])
+        given = self.log.swivels, self.log.frequencies
+        if all(read is None for read in given):
+            return None
+        return FurtherReadings(*(None if read is None else read[part] for read in given))
 
     def missed(self, numbers: Array) -> Array:
         """Differences (P,) between the internal parameters `numbers` and their priors, in prior standard deviations."""

@@ -81,7 +81,10 @@ def _root_of_trace(covariance: Array) -> Array:
 MOST = 300  # largest number of poses for the computation of the motion that is common to all poses
 _NEGLIGIBLE = 1e-12  # a slope is zero if it is less than this share of the largest slope
 # kinds without an effect on poses
-_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias", "clock_offset", "swivel_zero")
+_WITHOUT_MOTION = (
+    *("measuring_frame", "target", "load_cell_gain", "load_cell_bias"),
+    *("clock_offset", "swivel_zero", "inertia"),
+)
 
 
 def motion_slopes(
@@ -145,7 +148,7 @@ class Calibration(Findings, Saved):
         poses: Poses of the platform, N of them.
         unstrained_length: True lengths of the cables [m], (N, m).
         residuals: Readings minus predictions: lengths [m], load cells [N], position [m], rotation [rad], shape (N, 2 m
-            + 6), and with swivel angles [rad] (N, 3 m + 6); NaN if missing.
+            + 6); swivel angles [rad] and natural frequencies [Hz] follow, if they are read. NaN if missing.
         chi_squared_of_pose: Chi squared of each pose, (N,).
         weights: Weights of the poses, (N,); less than 1 for a pose that does not fit the other poses.
         outliers: Readings that do not fit.

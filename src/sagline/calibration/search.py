@@ -24,6 +24,8 @@ from sagline.robot.pose import Pose
 
 STRANGE: Final = 1e-9  # smallest probability of a misfit that may be due to noise
 FEW: Final = 0.1  # if a larger share of the poses does not fit, single cables are not the cause
+# first steps with equal weights: few poses with frequencies show errors of EA, and would count as outliers
+FIRST_STEPS: Final = 10
 FAR: Final = 0.03  # [m], a pose farther from the forward kinematics of the reported lengths is another equilibrium
 
 
@@ -56,6 +58,9 @@ def search_from_priors(
     if not kept.any():
         step = "Correct the lengths, or the robot: its anchors, and the zeros of its lengths."
         raise InvalidValueError("log", "without a pose at which this robot is in equilibrium", "at least one", step)
+    if robust and problem.log.frequencies is not None:
+        begun = solve(problem, current, kept, robust=False, steps=FIRST_STEPS, progress=progress)
+        current = begun.state, begun.normal
     fit = solve(problem, current, kept, robust=robust, progress=progress)
     if problem.straight:  # there is no other equilibrium
         return fit, kept, left_out

@@ -24,7 +24,7 @@ TABLE: Final = ".csv"
 FIGURES: Final = (".png", ".svg", ".pdf")
 DEVIATIONS: Final = (
     *("length_deviation", "tension_deviation", "position_deviation"),
-    *("rotation_deviation", "swivel_deviation"),
+    *("rotation_deviation", "swivel_deviation", "frequency_deviation"),
 )
 WITHOUT_PLAN: Final = opt.only_without("--plan")
 VALIDATION: Final = ("folds", "position_m", "position_before_m", "tension_n", "tension_before_n")
@@ -54,7 +54,7 @@ class _Options:
         "Unknown parameters, separated by commas; 'axial_stiffness*=10 %' means one common value (*; [] one per "
         "cable) with a standard deviation of the robot's value. Default: "
         "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass, and with load cells "
-        "load_cell_gain,load_cell_bias, and with swivel angles swivel_zero.",
+        "load_cell_gain,load_cell_bias, and with swivel angles swivel_zero, with frequencies inertia.",
     )
     also: str | None = opt.option(None, "NAMES", "Further unknowns beside the default ones: 'measuring_frame,target'.")
     length_deviation: float | None = _deviation("a length or counted length, '0.5 mm'", "m")
@@ -62,6 +62,7 @@ class _Options:
     position_deviation: float | None = _deviation("a measured coordinate, '1 mm'", "m")
     rotation_deviation: float | None = _deviation("a measured rotation, '1 mrad'", "rad")
     swivel_deviation: float | None = _deviation("a measured swivel angle, '5 mrad'", "rad")
+    frequency_deviation: float | None = _deviation("a measured natural frequency, '0.02 Hz'", "Hz")
     folds: int = opt.option(5, "NUMBER", "Groups of poses for the cross-validation; 0 for none.", WITHOUT_PLAN)
     robust: bool = opt.flag(True, "Give outliers less weight.", "--robust/--no-robust", WITHOUT_PLAN)
     model: str = opt.if_only(opt.MODEL, WITHOUT_PLAN)

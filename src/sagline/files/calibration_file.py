@@ -59,7 +59,7 @@ PARAMETERS: Final = (
     Quantity("prior_stated", P, "", "source of the prior: tolerances or caller", "stated", values=bool),
     Quantity("logarithmic", P, "", "true if the logarithm was estimated", values=bool),
 )
-READINGS: Final = "lengths [m], load cells [N], position [m], rotation [rad], swivel angles [rad]"
+READINGS: Final = "lengths [m], load cells [N], position [m], rotation [rad], swivel angles [rad], frequencies [Hz]"
 OLDEST: Final = 27  # number of kinds in the oldest files
 FOUND: Final = (
     Quantity("length_offset", ("cable",), "m", "correction of the lengths of the machine"),
@@ -83,6 +83,7 @@ SENSORS: Final = {  # name in the file: attribute and unit; a value is one numbe
     "position_deviation": ("axis", "m"),
     "rotation_deviation": ("axis", "rad"),
     "swivel_deviation": ("cable", "rad"),
+    "frequency_deviation": ("mode", "Hz"),
 }
 PLACED: Final = (
     Quantity("measuring_position", ("axis",), "m", "position of the measuring system", "frame.position"),
@@ -148,7 +149,10 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
             quantities += group
     sizes = {str(name): size for name, size in data.sizes.items()}
     kind_rows = max(OLDEST, min(sizes.get("kind_row", 0), KIND_ROWS))  # older files do not have the last kinds
+    sizes = {str(name): size for name, size in data.sizes.items()}
     readings = (3 if "swivel_deviation" in data.variables else 2) * m + 6
+    if "frequency_deviation" in data.variables:
+        readings = max(sizes.get("reading", 0), readings + 1)
     fixed = {"cable": m, "reading": readings, "kind_row": kind_rows, "other_parameter": sizes.get("parameter", 0)}
     v.check_variables(data, quantities, sizes | fixed)
     ranges = {"parameter_cable": (-1, m), "parameter_place": (-1, sizes["parameter"]), "outlier_cable": (-1, m)}

@@ -32,6 +32,7 @@ DEVIATIONS: Final = {
     "position_deviation": "m",
     "rotation_deviation": "rad",
     "swivel_deviation": "rad",
+    "frequency_deviation": "Hz",
 }
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
@@ -45,16 +46,19 @@ _OF_CABLE: Final = {
     "load_cell": "N",
     "swivel": "rad",
 }  # columns that exist once per cable, and their units
+MODES: Final = 6  # largest number of columns of natural frequencies
 _BESIDE: Final = ("load_cell", "swivel")  # columns of cables beside counts or lengths
 _NUMBERED = re.compile(rf"(count|length|load_cell|swivel)_([0-9]{{1,{len(str(_MOST))}}})")
 _POSE_COLUMNS: Final = (*XYZ, *EULER, *QUATERNION)
+_MODES: Final = tuple(f"frequency_{k}" for k in range(MODES))
 _MAPPED: Final = ("time", *_OF_CABLE, "position", "quaternion", "cable", "pose")  # other keys of a map of columns
 USUAL: Final = {
     "tension": "5 N",
     "position": "1 mm",
     "rotation": "1 mrad",
     "swivel": "5 mrad",
-}  # standard deviations of the sensors
+    "frequency": "0.02 Hz",
+}  # standard deviations of sensors
 
 
 class _Sensors(YamlEntry):
@@ -65,6 +69,7 @@ class _Sensors(YamlEntry):
     position_deviation: Any = None
     rotation_deviation: Any = None
     swivel_deviation: Any = None
+    frequency_deviation: Any = None
     frame: PoseEntry | None = None
     target: Any = None
 
@@ -131,9 +136,10 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     lengths = [match for match in found if match and match[1] in ("count", "length")]
     cables = max((min(int(match[2]), _MOST - 1) + 1 for match in lengths), default=1)
     optional_units = {f"{kind}_{k}": _OF_CABLE[kind] for k in range(cables) for kind in _BESIDE}
+    optional_units |= {f"frequency_{k}": "Hz" for k in range(MODES)}
     optional_units |= dict.fromkeys(XYZ, "m") | dict.fromkeys(EULER, "rad") | dict.fromkeys(QUATERNION, "")
     readings = {f"{kind}_{k}": _OF_CABLE[kind] for kind in ("count", "length") for k in range(cables)}
-    commanded = {name + COMMANDED: unit for name, unit in optional_units.items() if not name.startswith(_BESIDE)}
+    commanded = {f"{name}{COMMANDED}": optional_units[name] for name in _POSE_COLUMNS}
     units = {"time": "s", **readings, **optional_units, **commanded}
     table = CsvTable.read(path, text, units, gaps=frozenset((*readings, *optional_units)))
     kinds = [kind for kind in ("count", "length") if any(name in table.columns for name in _names(kind, cables))]
@@ -160,6 +166,7 @@ def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
         "unstrained_length": _stack_columns(table, _names("length", cables)),
         "load_cells": _stack_columns(table, _names("load_cell", cables), all_of_them=False),
         "swivel": _stack_columns(table, _names("swivel", cables), all_of_them=False),
+        "frequency": _frequencies(table),
         "position": position,
         "rotation": _rotation(table, ""),
         "time": columns.get("time"),
@@ -177,6 +184,12 @@ def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool =
         table.check_columns(names, f" beside {', '.join(found)}")
     none = np.full(len(table.lines), np.nan)
     return locked(np.stack([table.columns.get(name, none) for name in names], axis=-1))
+
+
+def _frequencies(table: CsvTable) -> Array | None:
+    """Columns of natural frequencies, from the first to the last one of the table."""
+    given = [k for k in range(MODES) if f"frequency_{k}" in table.columns]
+    return _stack_columns(table, [f"frequency_{k}" for k in range(max(given, default=-1) + 1)], all_of_them=False)
 
 
 def _is_without_yaw(table: CsvTable) -> bool:
@@ -242,6 +255,7 @@ def load_log(
     values. `C0` and `L0` are other names of `count_0` and `length_0`.
     - `load_cell_0`, ...: tensions at the frame ends; cables without a load cell have no column.
     - `swivel_0`, ...: swivel angles of the pulleys; their zeros are unknown.
+    - `frequency_0`, ...: lowest natural frequencies of the platform at this pose, ascending.
     - `x`, `y`, `z` (or some of them): position of the target in the axes of the measuring system.
     - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): rotation of the
       platform in these axes. `beta` and `gamma` without `alpha` are pitch and roll, as an inclinometer measures them;
@@ -312,12 +326,8 @@ def read_log(
     given = given.replace(**deviations) if deviations else given
     table, cables = _read(path, rows)
     fields = _fields(table, cables)
-    for name, key in (
-        ("load_cells", "tension"),
-        ("position", "position"),
-        ("rotation", "rotation"),
-        ("swivel", "swivel"),
-    ):
+    for key in USUAL:
+        name = "load_cells" if key == "tension" else key
         if fields[name] is not None and getattr(given, f"{key}_deviation") is None:
             wish = f"# {key}_deviation: {USUAL[key]}"
             step = f"Write a comment above the columns, for instance '{wish}', or give sensors (--{key}-deviation)."
@@ -333,7 +343,8 @@ def _map_of_columns(path: Path) -> tuple[dict[str, ColumnEntry], Sensors | None]
     """Map of columns in a YAML file, and the sensors; None without a key of the sensors."""
     entry = validate(parse_mapping(read_text(path, YAML_LIMIT), path), _LogMap, path)
     for key in entry.columns:
-        if not (_NUMBERED.fullmatch(key) or key in _MAPPED or key.removesuffix(COMMANDED) in _POSE_COLUMNS):
+        known = key in (*_MAPPED, *_MODES) or key.removesuffix(COMMANDED) in _POSE_COLUMNS
+        if not (known or _NUMBERED.fullmatch(key)):
             near = nearest(key, (*_MAPPED, *_POSE_COLUMNS))
             step = f"Did you mean {near}?" if near else "Remove it."
             reason = f"columns.{key} is an unknown key; allowed: {', '.join((*_MAPPED, *_POSE_COLUMNS))}"

@@ -202,7 +202,7 @@ def _durations(poses: Pose) -> list[float]:
 def _about(plan: CalibrationPoses) -> dict[str, Any]:
     """Header entry of the file: robot, version of sagline, and purpose of the poses."""
     numbers = plan.parameters
-    names = ("length_deviation", "tension_deviation", "position_deviation", "rotation_deviation", "swivel_deviation")
+    names = [f"{name}_deviation" for name in ("length", "tension", "position", "rotation", "swivel", "frequency")]
     given = {name: getattr(plan.sensors, name) for name in names}
     errors = {
         f"{label} [{unit}]" if unit else label: _plain(error)

@@ -10,10 +10,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
+from sagline.calibration.log import count_of_frequencies
 from sagline.calibration.result import Calibration
 from sagline.calibration.summary import chi_squared_text
 from sagline.core.arguments import choice, instance
-from sagline.core.arrays import locked, number
+from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.plot.labels import figure_legend, set_heading, spread_heights, write_beside
@@ -96,13 +97,16 @@ def _kinds(found: Calibration) -> list[_Kind]:
     """Residuals of the calibration, one entry per kind of reading."""
     sensors, m = found.sensors, found.robot.cable_count
     cables, axes = tuple(f"cable {k}" for k in range(m)), ("$x$", "$y$", "$z$")
-    spans = (
+    spans: list[tuple[str, Array | None, slice, tuple[str, ...], str]] = [
         ("lengths", sensors.length_deviation, slice(0, m), cables, "length"),
         ("load cells", sensors.tension_deviation, slice(m, 2 * m), cables, "load cell"),
         ("positions", sensors.position_deviation, slice(2 * m, 2 * m + 3), axes, "position"),
         ("rotations", sensors.rotation_deviation, slice(2 * m + 3, 2 * m + 6), axes, "rotation"),
         ("swivel angles", sensors.swivel_deviation, slice(2 * m + 6, 3 * m + 6), cables, "swivel angle"),
-    )
+    ]
+    modes = count_of_frequencies(sensors, m, found.residuals.shape[1])
+    width, names = found.residuals.shape[1], tuple(f"mode {k + 1}" for k in range(modes))
+    spans.append(("frequencies", sensors.frequency_deviation, slice(width - modes, width), names, "frequency"))
     return [
         (label, found.residuals[:, where] / deviation, names, quantity)
         for label, deviation, where, names, quantity in spans

@@ -24,4 +24,5 @@ TARGET = 24  # the measured point, platform frame, three rows [m]
 SCALE = 27  # scale of the reported lengths of a cable
 CLOCK = 28  # time by which the reported length of a cable is late [s]
 SWIVEL = 29  # swivel angle at which a sensor reads zero [rad]
-KIND_ROWS = 30
+INERTIA = 30  # logarithms of factors of the second moments of the mass, platform frame, three rows
+KIND_ROWS = 33

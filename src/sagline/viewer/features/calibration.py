@@ -11,7 +11,7 @@ import numpy as np
 from sagline.calibration import summary
 from sagline.calibration.findings import CalibrationStatus, Direction
 from sagline.calibration.least_squares import exceeded_with
-from sagline.calibration.log import reading_deviations
+from sagline.calibration.log import count_of_frequencies, reading_deviations
 from sagline.calibration.result import Calibration
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError, SaglineError
@@ -97,7 +97,8 @@ def _outliers_text(found: Calibration, chosen: int | None) -> str:
 def pose_residuals(found: Calibration, number: int) -> str:
     """HTML of the residuals at the pose `number`, beside the standard deviations of the sensors."""
     m, row = found.robot.cable_count, found.residuals[number]
-    spread = reading_deviations(found.sensors, found.robot.cable_count)
+    modes = count_of_frequencies(found.sensors, m, len(row))
+    spread = reading_deviations(found.sensors, m, modes)
     lines = "".join(
         f"<tr><td>{k}</td>{_cell(row[k], spread[k], 'm')}{_cell(row[m + k], spread[m + k], 'N')}</tr>" for k in range(m)
     )
@@ -107,7 +108,8 @@ def pose_residuals(found: Calibration, number: int) -> str:
         for axis, (name, unit) in enumerate(
             [(x, "m") for x in "xyz"]
             + [(f"about {x}", "rad") for x in "xyz"]
-            + [(f"swivel angle {k}", "rad") for k in range(len(row) - 2 * m - 6)]
+            + [(f"swivel angle {k}", "rad") for k in range(len(row) - 2 * m - 6 - modes)]
+            + [(f"frequency {k}", "Hz") for k in range(modes)]
         )
         if np.isfinite(row[2 * m + axis])
     )
