@@ -27,7 +27,7 @@ def near_the_middle(robot: sl.Robot, count: int) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("name", "unit"), wide([("article-prototype", "mm"), ("ipanema-3-pulleys", "inch"), ("fast", "m")])
+    ("name", "unit"), wide([("article-prototype", "inch"), ("ipanema-3-pulleys", "mm"), ("fast", "m")])
 )
 def test_forward_and_inverse_are_equal_to_sagline(name: str, unit: str, tmp_path: Path) -> None:
     robot = sl.load_robot(name)
