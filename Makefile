@@ -103,8 +103,9 @@ docs: env ## the documentation site, into build/site; warnings and dead links ar
 	$(BIN)/python -m tools.pages.check build/site
 	@echo "open build/site/index.html"
 
-dist: env ## wheel and source distribution, into dist
+dist: env ## wheel, source distribution and npm package, into dist
 	$(BIN)/python -m hatchling build
+	$(BIN)/python -m tools.javascript
 
 pins: env ## renew constraints.txt, the versions with which sagline is tested
 	$(BIN)/python -m tools.audit --pins > constraints.part && mv constraints.part constraints.txt

@@ -4,7 +4,7 @@
 
 const cable = (() => {
   const read = (name) => document.querySelector(`script[data-part=${name}]`).textContent;
-  const ready = kernels.made(read("kernels"), JSON.parse(read("calls")));
+  const ready = sagline.inflated(read("kernels")).then(sagline.load).then((it) => it.calls(JSON.parse(read("calls"))));
   let of = null;
 
   /** Cables at chord tensions; given: span, rise, density, stiffness, gravity. */

@@ -84,9 +84,9 @@ def c_source(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
 
 
 def web_assembly(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
-    """The module of shared pages, in node."""
-    found = answers_in_node(robot, pose, expected(robot, pose)["length"], folder)
-    position = np.array([each["rest"]["pose"]["position"] for each in found])
+    """The package for JavaScript, in node."""
+    found = answers_in_node(robot, pose, expected(robot, pose)["length"])
+    position = np.array([each["rest"]["position"] for each in found])
     names = {"length": "length", "chord_tension": "tension"}
     return {"position": position} | {name: np.array([each[key] for each in found]) for name, key in names.items()}
 

@@ -12,6 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
+from sagline.share.packing import page_script
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
 from tools.pages import explore
@@ -40,8 +41,9 @@ def browser() -> Iterator[Browser]:
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page without its theme."""
     folder = tmp_path_factory.mktemp("site")
-    for file in (DOCS / "explore.js", DOCS / "extra.css", explore.KERNELS):
+    for file in (DOCS / "explore.js", DOCS / "extra.css"):
         shutil.copy(file, folder)
+    (folder / "sagline.js").write_text(page_script(), encoding="utf-8")
     head = '<!doctype html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
     made = explore.with_cable((DOCS / "explore.md").read_text(encoding="utf-8"))
     assert f'data-span="{explore.SPAN:g}" data-gravity="{explore.GRAVITY:g}"' in made
@@ -65,7 +67,7 @@ def page(browser: Browser, site: Path) -> Iterator[Page]:
     page.close()
     assert complaints == []
     assert asked == [
-        site.with_name(name).as_uri() for name in ("explore.html", "extra.css", "kernels.js", "explore.js")
+        site.with_name(name).as_uri() for name in ("explore.html", "extra.css", "sagline.js", "explore.js")
     ]
 
 

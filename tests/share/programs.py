@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 from base64 import b64decode
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,10 +16,9 @@ from numpy.typing import NDArray
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.share.machine import model_data
-from sagline.share.packing import module_text
+from sagline.share.packing import SCRIPT
 from tools.translate import wasm
 
-SCRIPTS: Final = ("kernels.js", "robot.js")
 TARGET: Final = "x86_64-linux-musl"
 Rows = list[dict[str, list[float]]]
 Images = NDArray[np.uint64]
@@ -44,23 +42,20 @@ int main(void) {{
 """
 
 
-def in_node(machine: dict[str, Any], rows: Rows, folder: Path, repeat: int | None = None) -> bytes:
-    """Output of node.js; with `repeat`, all rows are timed repeatedly."""
+def in_node(machine: dict[str, Any], rows: Rows, repeat: int | None = None) -> bytes:
+    """Output of node.mjs; with `repeat`, all rows are timed repeatedly."""
     assert shutil.which("node"), "These tests need node: install it (apt-get install nodejs)."
-    page, scripts = files("sagline.share").joinpath("page"), folder / "scripts.js"
-    text = "\n".join(page.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
-    scripts.write_text(text, encoding="utf-8")
-    request = {"module": module_text(), "machine": machine, "rows": rows}
+    request = {"machine": machine, "rows": rows}
     given = json.dumps(request | ({} if repeat is None else {"repeat": repeat}))
-    command = ["node", str(Path(__file__).with_name("node.js")), str(scripts)]
+    command = ["node", str(Path(__file__).with_name("node.mjs")), str(SCRIPT)]
     return subprocess.run(command, input=given.encode(), capture_output=True, check=True).stdout
 
 
-def answers_in_node(robot: sl.Robot, pose: sl.Pose, lengths: Array, folder: Path) -> list[dict[str, Any]]:
-    """Answers of robot.js at poses, and at rest with lengths (N, m) [m] off the drums."""
+def answers_in_node(robot: sl.Robot, pose: sl.Pose, lengths: Array) -> list[dict[str, Any]]:
+    """Answers of sagline.mjs at poses, and at rest with lengths (N, m) [m] off the drums."""
     poses = np.hstack((pose.position, pose.quaternion))
     rows = [{"pose": row.tolist(), "given": given.tolist()} for row, given in zip(poses, lengths, strict=True)]
-    found: list[dict[str, Any]] = json.loads(in_node(model_data(robot), rows, folder, repeat=0))["found"]
+    found: list[dict[str, Any]] = json.loads(in_node(model_data(robot), rows, repeat=0))["found"]
     return found
 
 

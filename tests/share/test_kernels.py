@@ -82,20 +82,20 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_wasm_and_native_c_are_bit_equal(name: str, native: Path, tmp_path: Path) -> None:
     machine, rows = model_data(ROBOTS[name]), rows_of(sl.inverse(ROBOTS[name], poses(ROBOTS[name], 40)))
     program = linked_program(native, machine["kernels"], tuple(rows[0]), tmp_path / "program")
-    page, plain = in_node(machine, rows, tmp_path), in_program(program, rows)
+    page, plain = in_node(machine, rows), in_program(program, rows)
     assert len(page) == len(plain) == len(rows) * len(machine["kernels"]["calls"]) * machine["kernels"]["size"]
     np.testing.assert_array_equal(patterns(page), patterns(plain))
 
 
 class Answers:
-    """Results of robot.js at poses, and those of the library."""
+    """Results of sagline.mjs at poses, and those of the library."""
 
     def __init__(self, name: str, count: int, folder: Path) -> None:
         self.robot = ROBOTS[name]
         self.pose = poses(self.robot, count)
         self.plan = sl.inverse(self.robot, self.pose)
         self.rows = rows_of(self.plan)
-        answer = json.loads(in_node(model_data(self.robot), self.rows, folder, repeat=3))
+        answer = json.loads(in_node(model_data(self.robot), self.rows, repeat=3))
         self.found: list[dict[str, Any]] = answer["found"]
         self.times: dict[str, list[float]] = answer["times"]
         self.held: list[int] = np.flatnonzero(self.plan.feasible).tolist()
@@ -109,7 +109,7 @@ def answers(request: pytest.FixtureRequest, tmp_path: Path) -> Answers:
     return Answers(request.param, 60, tmp_path)
 
 
-def test_the_page_agrees_with_the_library(answers: Answers) -> None:
+def test_the_package_agrees_with_the_library(answers: Answers) -> None:
     plan, found, held = answers.plan, answers.found, answers.held
     assert [one["status"] for one in found] == plan.status.tolist()
     assert 1 < len(held) < len(found)
@@ -122,7 +122,11 @@ def test_the_page_agrees_with_the_library(answers: Answers) -> None:
     for i in held:
         rest = sl.forward(answers.robot, answers.rows[i]["given"], start=answers.pose[i])
         assert found[i]["rest"]["status"] == rest.status
-        np.testing.assert_allclose(found[i]["rest"]["pose"]["position"], rest.pose.position, rtol=0.0, atol=1e-12)
+        assert found[i]["rest"]["solved"]
+        turned = np.array(found[i]["rest"]["quaternion"])
+        expected = rest.pose.quaternion * np.sign(turned @ rest.pose.quaternion)
+        np.testing.assert_allclose(turned, expected, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(found[i]["rest"]["position"], rest.pose.position, rtol=0.0, atol=1e-12)
     for i in (held[0], answers.lost[0]):
         pose, tension = answers.pose[i], plan.chord_tension[i]
         expected = Snapshot(answers.robot, pose, sl.inverse(answers.robot, pose), None).courses(1.0)
@@ -135,5 +139,5 @@ def test_a_platform_end_at_an_anchor_is_reported(tmp_path: Path) -> None:
     robot = ROBOTS["falcon-7"]
     at = robot.frame_anchors[3] - robot.platform_anchors[3]
     row = {"pose": [*at.tolist(), 0.0, 0.0, 0.0, 1.0]}
-    (found,) = json.loads(in_node(model_data(robot), [row], tmp_path, repeat=0))["found"]
+    (found,) = json.loads(in_node(model_data(robot), [row], repeat=0))["found"]
     assert (found["status"], found["blocking"]) == (sl.PoseStatus.NO_CHORD, [3])

@@ -275,7 +275,7 @@ def from_wasm(folder: Path) -> Run:
             each.flags.writeable = False  # such arrays keep their values
         entry = call.symbol.removeprefix(wasm.PREFIX)
         kernels = described_calls({"entry": (entry, arguments)}, arrays)
-        memory = in_node({"kernels": kernels}, [{}], folder)
+        memory = in_node({"kernels": kernels}, [{}])
         for (name, each), flag in zip(arrays.items(), kept, strict=True):
             kind, place, count = kernels["arrays"][name]
             each.flags.writeable = True

@@ -11,8 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
+from sagline.share.packing import page_script
 from tools.pages.controller import with_tables
-from tools.pages.explore import KERNELS, with_cable
+from tools.pages.explore import with_cable
 from tools.pages.formulas import with_formulas
 from tools.pages.gallery import command_reference, gallery
 from tools.pages.marks import ABOVE, MADE, MARK, PAGES, ROOT, WORK, folder_for, shown_above
@@ -27,7 +28,7 @@ def main() -> None:
     for folder in (PAGES, WORK):
         shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(DOCS, PAGES)
-    shutil.copy(KERNELS, PAGES)
+    (PAGES / "sagline.js").write_text(page_script(), encoding="utf-8")
     pages = {file.relative_to(DOCS).as_posix(): file.read_text(encoding="utf-8") for file in DOCS.rglob("*.md")}
     pages |= {"gallery.md": gallery(), "api/command.md": command_reference(), **reference_pages()}
     with ThreadPoolExecutor(os.cpu_count()) as pool:

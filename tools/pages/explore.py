@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +17,6 @@ from sagline.cables.models import Catenary, Empirical
 from sagline.kernels.tables import BUFFERS, CHUNK
 from sagline.share.packing import Call, described_calls, module_text
 
-KERNELS: Final = Path(__file__).parents[2] / "src/sagline/share/page/kernels.js"
 MARK: Final = re.compile(r"^<!-- one cable, (.+) -->$", re.MULTILINE)
 SPAN, RISE, DENSITY, STIFFNESS, GRAVITY = 12.0, -4.0, 0.067, 44e3, 9.81  # m, m, kg/m, N, m/s^2: the article's cable
 TENSIONS: Final = (30.0, 100.0, 300.0, 1000.0)  # N, of the table

@@ -22,6 +22,7 @@ class _Format(StrEnum):
 
     ROBOT = "robot"
     MJCF = "mjcf"
+    JAVASCRIPT = "javascript"
 
 
 class _Inputs(StrEnum):
@@ -47,7 +48,8 @@ class _Unit(StrEnum):
 
 
 LEAST = 1e-6  # smallest position error that is printed [m]
-ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf")}
+ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf"), _Format.JAVASCRIPT: (".json",)}
+KINDS = {_Format.ROBOT: "a robot file", _Format.MJCF: "a MuJoCo model", _Format.JAVASCRIPT: "a robot for JavaScript"}
 
 
 def convert(
@@ -58,7 +60,10 @@ def convert(
     ),
     out: Path | None = opt.STDOUT,
     form: _Format = opt.option(
-        _Format.ROBOT, "KIND", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--kind"
+        _Format.ROBOT,
+        "KIND",
+        "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables; javascript: JSON for JavaScript.",
+        "--kind",
     ),
     linear_density: float | None = opt.quantity(
         None,
@@ -79,7 +84,7 @@ def convert(
         None, "X Y Z", "MuJoCo: initial position of the platform [m]. Default: middle of the test box."
     ),
 ) -> None:
-    r"""Convert a robot of CASPR or WireX to a robot file, or convert any robot to a MuJoCo model.
+    r"""Convert a robot of CASPR or WireX to a robot file, or any robot to a MuJoCo model or to JSON.
 
     Assumptions are printed on stderr and written into the robot file, and so are the data of the input that are lost.
 
@@ -89,6 +94,7 @@ def convert(
         sagline convert robot.wcrfx --out my_robot.yaml \
             --linear-density "20 g/m" --axial-stiffness "50 kN"
         sagline convert cogiro --kind mjcf --out cogiro.xml
+        sagline convert cogiro --kind javascript --out cogiro.json
     """
     from sagline.core.arrays import FARTHEST
     from sagline.files.pose_text import decimal_numbers
@@ -97,18 +103,19 @@ def convert(
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise sl.FileError(out, "is the file to convert", "Name another file with --out.")
     if out is not None and out.suffix.lower() not in ENDINGS[form]:
-        kind = "a robot file" if form is _Format.ROBOT else "a MuJoCo model"
-        raise sl.FileError(
-            out, f"is not a valid name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --kind."
-        )
-    if at is not None and form is _Format.ROBOT:
-        raise sl.InvalidValueError(
-            "--at", "given for a robot file", "--kind mjcf", "A robot file contains no pose. Leave the option out."
-        )
+        step = f"Let it end in {ENDINGS[form][0]}, or choose another --kind."
+        raise sl.FileError(out, f"is not a valid name for {KINDS[form]}", step)
+    if at is not None and form is not _Format.MJCF:
+        step = f"{KINDS[form].capitalize()} contains no pose. Leave the option out."
+        raise sl.InvalidValueError("--at", f"given for {KINDS[form]}", "--kind mjcf", step)
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
     if form is _Format.ROBOT:
         text = sl.dump_robot(imported.robot)
+    elif form is _Format.JAVASCRIPT:
+        from sagline.share.machine import javascript_text
+
+        text = javascript_text(imported.robot)
     else:
         text, straightness = _mjcf(imported.robot, place)
         imported = replace(imported, lost=(*imported.lost, straightness))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import zlib
 from html import escape
+from importlib.metadata import version
 from math import isfinite
 from typing import Any, Final
 
@@ -22,7 +25,7 @@ from sagline.robot.batch import has_routing, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
-from sagline.share.packing import Call, PackedColumn, described_calls, encode_columns
+from sagline.share.packing import MODULE, Call, PackedColumn, check_module, described_calls, encode_columns
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import DEFAULT
@@ -39,14 +42,14 @@ _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2,
 
 
 def drawing_data(robot: Robot) -> dict[str, Any]:
-    """Data for page/robot.js: the call of the kernel that draws the cables of a run, and the data of `robot`."""
+    """Data for page/sagline.mjs: the call of the kernel that draws the cables of a run, and the data of `robot`."""
     pose, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros(robot.cable_count)
     arguments = _draw_arguments(robot, robot_terms(robot), pose[0], tension)
     return _described(robot, {"draw": ("cable_courses", arguments)}, pose, arguments)
 
 
 def model_data(robot: Robot) -> dict[str, Any]:
-    """Data for page/robot.js: calls of the kernels of kinematics and drawing, and the data of `robot`."""
+    """Data for page/sagline.mjs: calls of the kernels of kinematics and drawing, and the data of `robot`."""
     behind, m, n = has_routing(robot) or None, robot.cable_count, robot.degrees_of_freedom
     model, method = Catenary(), DEFAULT.alone
     terms, options, memory = robot_terms(robot), kernel_options(robot, model, method), memory_for(m)
@@ -87,6 +90,13 @@ def model_data(robot: Robot) -> dict[str, Any]:
         "infeasible": PoseStatus.INFEASIBLE.value,
         "freedom": json_numbers(robot.freedom),
     }
+
+
+def javascript_text(robot: Robot) -> str:
+    """JSON of `model_data` for the JavaScript package; it fits the module of this version only."""
+    check_module()
+    about = {"name": robot.name, "version": version("sagline"), "module": zlib.crc32(MODULE.read_bytes())}
+    return json.dumps(about | model_data(robot), allow_nan=False, separators=(",", ":")) + "\n"
 
 
 def _described(

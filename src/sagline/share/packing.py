@@ -1,4 +1,4 @@
-"""Data of a shared page as text: calls of kernels for page/kernels.js, and samples for page/states.js."""
+"""Data of a shared page as text: calls of kernels for page/sagline.mjs, and samples for page/states.js."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ from sagline.files.c_calls import AnyArray, leaves, owner
 from sagline.files.packed import smallest_differences
 
 Call = tuple[str, tuple[Any, ...]]  # name of the C entry without prefix, and arguments as in Python
-MODULE: Final = files("sagline.share").joinpath("page").joinpath("kernels.wasm")
+PAGE: Final = files("sagline.share").joinpath("page")
+MODULE: Final = PAGE.joinpath("kernels.wasm")
+SCRIPT: Final = PAGE.joinpath("sagline.mjs")  # with MODULE, the package for JavaScript
+EXPORTS: Final = "/* Exports:"  # the lines from here on are not for a page
 _ALIGNED: Final = 16  # bytes
 
 
@@ -33,6 +36,11 @@ def module_text() -> str:
     """Read the WebAssembly module, deflated and in base64."""
     check_module()
     return b64encode(zlib.compress(MODULE.read_bytes(), 9)).decode("ascii")
+
+
+def page_script() -> str:
+    """Read the JavaScript module for a page that opens from the disk, where no module can be imported."""
+    return SCRIPT.read_text(encoding="utf-8").partition(EXPORTS)[0]
 
 
 def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) -> dict[str, Any]:

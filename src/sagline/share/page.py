@@ -18,12 +18,12 @@ from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.course import SharedMotion
 from sagline.share.machine import colors, drawing_data, json_numbers, model_data, robot_drawing, solids_data
-from sagline.share.packing import PackedColumn, encode_columns, module_text
+from sagline.share.packing import PackedColumn, encode_columns, module_text, page_script
 from sagline.viewer.shapes import round_below, size_of
 from sagline.viewer.tension_scale import number_text
 
 SCRIPTS: Final = (  # in the order of their dependencies
-    "kernels.js", "robot.js", "states.js", "theme.js",
+    "robot.js", "states.js", "theme.js",
     "renderer.js", "camera.js", "scene.js", "panel.js",
     "pointers.js", "player.js", "share.js",
 )  # fmt: skip
@@ -107,7 +107,7 @@ def _filled(facts: dict[str, Any], notes: Sequence[str], **parts: str) -> str:
     words |= {
         "version": version("sagline"),
         "style": own.joinpath("share.css").read_text(encoding="utf-8"),
-        "script": "\n".join(own.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS),
+        "script": "\n".join((page_script(), *(own.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS))),
         "kernels": module_text(),
         "unit": scale["unit"],
         "legend": f"Colors of the cables: from {low} to {high} {scale['unit']}",

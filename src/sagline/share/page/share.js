@@ -7,9 +7,9 @@ const share = (() => {
   let machine = null; // its functions, once the kernels are compiled
 
   /** Why there are no tensions. */
-  function reason({ status, blocking, short }) {
-    const { statuses, infeasible } = facts.machine, { newtons, unit, digits } = facts.colors;
-    if (status !== infeasible) return `Not possible: ${statuses[status]}${blocking.length ? `: cable ${blocking.join(", ")}` : ""}`;
+  function refusal({ status, reason, blocking, short }) {
+    const { infeasible } = facts.machine, { newtons, unit, digits } = facts.colors;
+    if (status !== infeasible) return `Not possible: ${reason}${blocking.length ? `: cable ${blocking.join(", ")}` : ""}`;
     const much = short < Infinity ? `short of ${written(short / newtons, digits)} ${unit}` : "no force alone would do";
     return `Not feasible: ${much}; at their limits: cables ${blocking.join(", ")}`;
   }
@@ -22,18 +22,18 @@ const share = (() => {
 
   /** A robot at a pose, balanced. */
   function balanced(pose) {
-    const state = machine.balanced(pose), none = facts.machine.anchors.map(() => NaN);
-    const verdict = { good: state.feasible, words: state.feasible ? "Feasible" : reason(state) };
+    const state = machine.inverse(pose), none = facts.machine.anchors.map(() => NaN);
+    const verdict = { good: state.feasible, words: state.feasible ? "Feasible" : refusal(state) };
     return moment(pose, state.tension ?? none, { length: state.length ?? none, verdict });
   }
 
   /** A planned moment with one cable longer by some meters: where the platform comes to rest. */
   function wound(planned, cable, more) {
     const length = planned.length.map((each, i) => (i === cable ? each + more : each));
-    const rest = machine.atRest(length, planned.pose), solved = rest.status === 0;
-    const way = 1e3 * Math.hypot(...robot.plus(rest.pose.position, -1, planned.pose.position));
-    const words = solved ? `At rest ${written(way, 1)} mm from the planned pose` : `Not held: ${facts.machine.rests[rest.status]}`;
-    return moment(rest.pose, rest.tension, { length, verdict: { good: solved ? null : false, words } });
+    const { solved, reason, position, quaternion, tension } = machine.forward(length, planned.pose);
+    const way = 1e3 * Math.hypot(...robot.plus(position, -1, planned.pose.position));
+    const words = solved ? `At rest ${written(way, 1)} mm from the planned pose` : `Not held: ${reason}`;
+    return moment(robot.posed(position, quaternion), tension, { length, verdict: { good: solved ? null : false, words } });
   }
 
   /** A robot whose kernels are not compiled yet: straight cables without tensions. */
@@ -187,7 +187,7 @@ const share = (() => {
     theme.follow(redraw);
     resize();
     if (!facts.states) show(straight());
-    machine = robot.made(facts.machine, await kernels.made(found("kernels").textContent, facts.machine.kernels));
+    machine = await (await sagline.load(await sagline.inflated(found("kernels").textContent))).robot(facts.machine);
     if (!facts.states) {
       let planned = null;
       const reset = winch((cable, more) => show(planned.feasible && more ? wound(planned, cable, more) : planned));

@@ -25,7 +25,7 @@ const states = (() => {
 
   /** Columns by their names: arrays of Float64Array; a code that stands for nothing becomes NaN. */
   async function unpacked(header, text) {
-    const bytes = await kernels.inflated(text), found = {};
+    const bytes = await sagline.inflated(text), found = {};
     let place = 0;
     for (const { name, scale, step, nothing, columns } of header.channels) {
       const number = value[scale](step);
