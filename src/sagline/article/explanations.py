@@ -67,7 +67,7 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
 
 
 def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
-    """Actual lengths of the cables if the winches are commanded the lengths of `plan` after homing at `home`."""
+    """Actual lengths of the cables if the winches follow the lengths of `plan` after homing at `home`."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 

@@ -79,7 +79,7 @@ class EmpiricalFit(Result):
             tolerance: Allowed position error [m], > 0.
 
         Returns:
-            The tension; NaN if a cable with the highest sampled tension exceeds the tolerance.
+            The tension; NaN if the error at the highest sampled tension exceeds the tolerance.
         """
         worst = self.position_error.max(axis=(0, 1))
         return _first_of_good_tail(self.tensions, worst <= _tolerance(tolerance))

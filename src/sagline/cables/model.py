@@ -164,7 +164,7 @@ class CableModel:
         kernel: Callable[..., None],
         *work: Array,
     ) -> CableState:
-        """State of cables from the values `given`; names: names of the given quantity and of the result of `kernel`."""
+        """State of cables from the values `given`. `names`: the given quantity and the result of `kernel`."""
         span = _checked_span(span)
         rise = checked(rise, "rise", "m")
         gravity = number(gravity, "gravity", "m/s^2", low=0.0)

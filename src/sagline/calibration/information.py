@@ -28,7 +28,7 @@ class Information:
 
     Attributes:
         rows: Derivatives of the whitened readings by the internal parameters, shape (N, k, P).
-        covariance: Covariance of the parameters with the prior and the readings of the chosen candidates, shape (P, P).
+        covariance: Covariance of the parameters that follows from the prior and the chosen candidates, shape (P, P).
         chosen: Indices of the chosen candidates, in the order of choice.
     """
 

@@ -37,7 +37,7 @@ NO_LOAD: Final = locked(np.zeros((1, 6)))  # no external wrench: only cable forc
 
 
 def lengths_at_counts(drums: Drums, counts: Array) -> Array:
-    """Unstrained lengths off the drums at counts [m], both (N, m)."""
+    """Unstrained lengths off the drums [m], shape (N, m), from counts of the same shape."""
     return np.asarray(drums.lengths_at(counts) / (1.0 + drums.rest_strain))
 
 

@@ -167,7 +167,7 @@ def _by_row(flags: Flags, array: Array) -> Flags:
 
 
 def _slopes(machine: MachineTerms, lines: _Lines, reported: Array) -> Array:
-    """Derivatives (N, m + 6, P) of predictions minus reported lengths by the unknowns, at constant poses.
+    """Derivatives (N, m + 6, P) of the residuals by the unknowns, at constant poses.
 
     reported: derivatives of reported lengths (5, N, m) from `winch_slopes`.
     """

@@ -305,7 +305,7 @@ class Files:
 
 @dataclass(frozen=True)
 class DataFiles(Files):
-    """Options of the files of a command without figures."""
+    """Options for the output files of a command that draws no figures."""
 
     figures: bool = False
     formats: Any = ()

@@ -91,7 +91,7 @@ def points_of(text: str, item: str) -> tuple[int, ...]:
 
 
 def box_of(text: str, item: str) -> sl.PoseBox:
-    """A box of level poses from "-2..2, -1..1, 1..3 m". A number instead of a span, "0", makes the box a plane."""
+    """A box of level poses from "-2..2, -1..1, 1..3 m". A single number in place of a span makes it flat."""
     step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
     parts = text.replace("−", "-").split(",")
     if len(parts) != 3 or len(text) > _LONGEST:

@@ -310,7 +310,7 @@ class Stopping(ActiveState):
         return self
 
     def fail(self, line: str) -> ActiveState:
-        """Change the state after the ramp to FAULT."""
+        """End the ramp in the state FAULT."""
         self._end_in_fault(line)
         return self
 

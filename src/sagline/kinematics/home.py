@@ -56,8 +56,8 @@ def home(
 
     Raises:
         InvalidValueError: If the robot has no winches, or its winches have guides. If `pose` is a batch or has the
-            wrong type. If a value exceeds load_cell_range, a tension is too small or too large for its cable at this
-            pose, or a length off a drum exceeds cable_length: the message names the cable.
+            wrong type. If a value exceeds load_cell_range, or a length off a drum exceeds cable_length, or if a tension
+            is too small or too large for its cable at this pose. The message names the cable.
         CableGeometryError: If the ends of a cable coincide at this pose, or its platform end is inside its pulley.
 
     Examples:

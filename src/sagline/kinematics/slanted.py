@@ -165,7 +165,7 @@ def _next_exits(
     size: Array,
     results: Array,
 ) -> Array:
-    """Columns of `exits_of_forces` at the forces found; NaN without a force. `chord` (N, m, 3), `size` (N, m) [m]."""
+    """Columns of `exits_of_forces` at the found forces; NaN if there is none. `chord` (N, m, 3), `size` (N, m) [m]."""
     weightless = model.code == codes.ELASTIC
     weight = 0.0 if weightless else cables_of(robot).linear_density * first_of(robot).gravity
     force = np.empty(chord.shape)

@@ -249,7 +249,7 @@ class Puncture(TensionMethod):
     """First point within the limits on the line between minimum-norm tensions and the (improved) closed form.
 
     The tensions are low, and the method is as fast as a closed form. Puncture solves the same poses as
-    `ImprovedClosedForm`: a few feasible poses get the status NOT_COVERED, 2 of 1,200 in a test with ipanema-3. Choose
+    `ImprovedClosedForm`. A few feasible poses get the status NOT_COVERED: 2 of 1,200 in a test with ipanema-3. Choose
     this method for low tensions if the computer is too slow for a method with a polygon.
 
     Source:

@@ -83,7 +83,7 @@ class Page:
         found: A calibration of the robot to show; None if there is none.
         mode: Name of the initially animated mode, "1" or "massless 1"; "" if there is none.
         source: Expressions for the objects with which the page was opened.
-        view: The shown view; None at first. While features follow a new view, it is the previous view.
+        view: The shown view; None at first. It is replaced after all features have followed the new view.
         features: All features, in the order of their updates.
         updates: Number of views that were shown.
         dragging: Clients that drag the platform.

@@ -74,7 +74,7 @@ class Nodes:
         self.draw(name, self.scene.add_label, visible=bool(text), text=text, **looks)
 
     def body(self, name: str, solid: Solid, color: Any, opacity: float, pose: Pose, position: Any = None) -> None:
-        """Draw a solid at a pose, optionally at another position."""
+        """Draw a solid at a pose. `position` replaces the position of the pose."""
         place = pose.position if position is None else position
         self.draw(name, self.scene.add_frame, show_axes=False, position=place, wxyz=np.roll(pose.quaternion, 1))
         self.mesh(f"{name}/body", *solid, color, opacity)

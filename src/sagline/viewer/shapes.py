@@ -293,7 +293,7 @@ THINNEST: Final = 0.03  # smallest axis of a drawn ellipsoid, relative to its lo
 
 
 def error_ellipsoids(covariance: Array) -> tuple[Indices, Array, Array]:
-    """Ellipsoids of points whose errors, with `covariance` (N, 3, 3) [m^2], are known and not zero.
+    """Error ellipsoids of the points with known nonzero errors, from `covariance` (N, 3, 3) [m^2].
 
     Returns:
         Indices of these points, shape (k,); standard errors along the axes [m], shape (k, 3); and the axes, one per

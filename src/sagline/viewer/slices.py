@@ -92,7 +92,7 @@ def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> tuple[NDArray
 
 
 def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> Marks:
-    """Labels of the lines, beginning with 0; each is at the farthest point of its line in a direction of its own."""
+    """Labels of the lines from 0 on. Each label is at the farthest point of its line in another direction."""
     apart = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
     marks: Marks = []
     for k, (edge, segments) in enumerate(lines):

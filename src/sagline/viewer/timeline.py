@@ -103,7 +103,7 @@ def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str])
 
 
 def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ...]:
-    """Spans of a plan of N poses in which it is not feasible or not stable."""
+    """Time spans in which a plan of N poses is not feasible or not stable."""
 
     def why(rows: slice) -> str:
         lost = plan.status[rows] == PoseStatus.INFEASIBLE

@@ -252,7 +252,7 @@ def _integrator_code(integrator: Any, kind: int, elements: int) -> int:
 def _time_step(
     given: InitialConditions, data: Array, step: Any, code: int, kind: int, losses: Damping, events: Any, elements: int
 ) -> float:
-    """Check `step` [s] for the smallest platform mass of the run; `data`: drives; `elements`: per cable with mass."""
+    """Check `step` [s] at the smallest platform mass. `elements`: number of elements of a cable with mass, else 0."""
     robot, lengths = given.robot, given.lengths.value
     waves = wave_frequency(given, elements) if elements else 0.0
     highest = highest_frequency(robot, given.poses, lengths, kind, data, _lightness(robot.mass, events))

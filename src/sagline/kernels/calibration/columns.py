@@ -263,7 +263,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 @glue
 def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
-    """Fill the change of every reading per unit wrench, which moves the platform. The stiffness must be factored."""
+    """Fill the change of every reading per unit wrench on the platform. The stiffness must be factored."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:

@@ -173,7 +173,7 @@ def _newton_steps(
     """Take one Newton step for the force balance, shortened until the unbalance is below `best`. Uses the stiffness.
 
     Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
-    unchanged. If the unbalance is below `good`, only the full step is tried, because rounding can increase it.
+    unchanged. An unbalance below `good` can increase by rounding; then only the full step is tried.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     step, trial, part = space.step, space.trial, space.part

@@ -99,7 +99,7 @@ def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -
 
 @kernel
 def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
-    """Local minimum [m] of the distance of a pair, and the two shares of its points; searched from `s` and `t`."""
+    """Local minimum [m] of the distance of two cables, and the shares of its points. Search from `s` and `t`."""
     if to_a_box:
         square, s = shapes.nearest_to_box(one, other, s)
     else:

@@ -115,7 +115,7 @@ def distribute_and_solve_cables(
 
 @glue
 def _strain_admits_tensions(cables: Cables) -> bool:
-    """True if no cable without upper limit exceeds the largest strain. The distribution methods ignore this strain."""
+    """True if all cables without an upper limit are within the largest strain. The distribution methods ignore it."""
     for i in range(cables.tau.size):
         if cables.tau[i] > cables.high[i] and states.is_limited_by_strain(cables, i):
             return False

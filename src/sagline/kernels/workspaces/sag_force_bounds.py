@@ -155,7 +155,7 @@ def rise_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def fall(curves: Curves, i: int, low: float, high: float) -> float:
-    """Largest decrease [N] of the sag force of cable `i` from the chord tension `low` to the higher tension `high`."""
+    """Largest decrease [N] of the sag force of cable `i` while its chord tension increases from `low` to `high`."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -167,7 +167,7 @@ def fall(curves: Curves, i: int, low: float, high: float) -> float:
 
 @kernel
 def rise(curves: Curves, i: int, low: float, high: float) -> float:
-    """Largest increase [N] of the sag force of cable `i` from the chord tension `low` to the higher tension `high`."""
+    """Largest increase [N] of the sag force of cable `i` while its chord tension increases from `low` to `high`."""
     if not has_sag(curves, i):
         return 0.0
     half = curves.cables.half_weight[i]
