@@ -98,6 +98,23 @@ def energies() -> Iterator[Row]:
             yield Row(f"{name}: trend of the energy, {integrator}", limit, shown)
 
 
+def moving_anchors() -> Iterator[Row]:
+    """A plan and its simulation on a ship that heaves and rolls, relative to fixed anchors; CoGiRo."""
+    robot, seconds = sl.load_robot("cogiro"), 20.0
+    path = sl.quintic_path([(0, 0, 2), (2, 1, 2.5)], durations=seconds, rate=500.0)
+    wave = np.sin(path.time)
+    place = sl.Pose.from_euler(np.outer(wave, [0.1, 0.0, 0.2]), 0.0, 0.0, 0.02 * wave)
+    anchors = sl.anchors_on_bases(robot, [(sl.path_from_samples(path.time, place), range(8))])
+    plans = [partial(sl.inverse, robot, path, anchors=each) for each in (anchors, None)]
+    moved, fixed = np.min([[best_seconds(run, 1) for run in plans] for _ in range(9)], axis=0)
+    shown = f"{1e6 * moved / len(path):.1f} us per pose; {moved / fixed:.1f} x"
+    yield Row("plan with moving anchors; relative to fixed anchors", "", shown)
+    runs = [partial(sl.simulate, plan(), step=1e-3, record=0.1) for plan in plans]
+    moved, fixed = np.min([[best_seconds(run, 1) for run in runs] for _ in range(3)], axis=0)
+    shown = f"{seconds / moved:.0f} x real time; {moved / fixed:.2f} x"
+    yield Row("simulation with moving anchors, steps of 1 ms; time relative to fixed anchors", "", shown)
+
+
 def lumped() -> Iterator[Row]:
     """Cables with mass as chains, CoGiRo and expo2015-lucia."""
     state = broken_state()
@@ -140,7 +157,7 @@ def lumped() -> Iterator[Row]:
         )
 
 
-PARTS = (residuals, shortest, speed, energies, lumped, *vibrations.PARTS)
+PARTS = (residuals, shortest, speed, energies, moving_anchors, lumped, *vibrations.PARTS)
 
 if __name__ == "__main__":
     print_table("Dynamics", PARTS)

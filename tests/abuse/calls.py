@@ -182,6 +182,7 @@ class _Given:
         self.run = sl.inverse(self.robot, self.path)
         limited = self.robot.replace(winches=sl.Winch(drum_radius=0.06, speed_limit=30.0))
         self.driven = sl.inverse(limited, self.pose).state
+        self.anchors = sl.anchors_on_bases(self.robot, [(self.path, range(8))])
         self.hung = sl.Catenary().from_tension(self.cable, [10.0, 11.0, 12.0], 2.0, 100.0)
         self.length = self.plan.unstrained_length
 
@@ -330,6 +331,16 @@ def _motions(given: _Given) -> dict[str, Call]:
         "quintic_path: limits": Call(sl.quintic_path, _all(waypoints=stops, **limits, rate=rate)),
         "septic_path: limits": Call(sl.septic_path, _all(waypoints=stops, **limits, rate=rate)),
         "article_path": Call(sl.article_path, _all(rate=rate)),
+        "AnchorMotion": Call(
+            sl.AnchorMotion, _all(time=time, position=("array", np.ones((size, 8, 3)) * np.arange(size)[:, None, None]))
+        ),
+        **{
+            f"AnchorMotion.{name}": Call(getattr(given.anchors, name), _all(time=("array", [0.25, 0.5])))
+            for name in ("at", "velocity", "acceleration")
+        },
+        "anchors_on_bases": Call(
+            sl.anchors_on_bases, _all(robot=("one", given.robot), bases=("one", [(given.path, [0, 1])]))
+        ),
     }
 
 
@@ -393,6 +404,9 @@ def _kinematics(given: _Given) -> dict[str, Call]:
             _all(given=("words", ["x", "y", "z", "level"], True), level=("number", 2.0)),
         ),
         "inverse: a path": Call(sl.inverse, _all(robot=robot, motion=("motion", given.path), wrench=wrench)),
+        "inverse: anchors": Call(
+            partial(sl.inverse, given.robot, given.path), _all(anchors=("one", given.anchors, True))
+        ),
         "inverse: previous tensions": Call(
             partial(sl.inverse, given.robot, given.pose, tension=sl.Closest()),
             _all(previous=("tensions", given.plan.chord_tension, True)),
@@ -1365,6 +1379,9 @@ def _in_time(given: _Given) -> dict[str, Call]:
             ),
         ),
         "simulate: pose": Call(partial(sl.simulate, given.robot, duration=0.02), _all(pose=("one", given.pose))),
+        "simulate: anchors": Call(
+            partial(sl.simulate, given.robot, given.pose, duration=0.02), _all(anchors=("one", given.anchors, True))
+        ),
         "simulate: wind": Call(
             partial(sl.simulate, in_wind, duration=0.02),
             _all(wind=("table", ([0.0, 1.0], np.ones((2, 3))), True)),

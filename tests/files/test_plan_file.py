@@ -235,7 +235,7 @@ def test_other_files_are_refused(tmp_path: FilePath, saved: FilePath, snapshot: 
 @pytest.mark.parametrize(
     ("attribute", "value", "parts"),
     [
-        ("sagline_format", 3, ("sagline_format", None, None, "Install a newer sagline.")),
+        ("sagline_format", 4, ("sagline_format", None, None, "Install a newer sagline.")),
         ("sagline_format", 0, ("sagline_format",)),
         ("sagline_format", "two", ("sagline_format", "has the unknown format 'two'")),
         ("model", "Rope", ("model", "'Rope'", "Straight, Elastic, Empirical, Parabolic, Catenary")),

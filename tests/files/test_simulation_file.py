@@ -91,7 +91,7 @@ def test_limits_of_drives_and_pieces_of_broken_cables_are_saved(tmp_path: FilePa
 
 def test_all_fields_of_a_simulation_are_saved() -> None:
     places = {quantity.place.split(".")[0] for quantity in (TIME, *SAMPLES, LARGEST, NODES)}
-    told = {"robot", "events", "cable_mass", "step", "integrator", "winches", "winding", "damping"}
+    told = {"robot", "events", "cable_mass", "step", "integrator", "winches", "winding", "damping", "anchors"}
     assert places | told == {field.name for field in fields(sl.Simulation)}
     kept = {quantity.place for quantity in SAMPLES if quantity.place.startswith("energy.")}
     assert kept == {f"energy.{field.name}" for field in fields(EnergyBalance)}
@@ -243,7 +243,7 @@ def test_impossible_values(
         (lambda data: data.assign_attrs(step="x"), ("step", "'x'")),
         (lambda data: data.assign_attrs(robot="name: x"), ("frame_anchors", "missing")),
         (
-            lambda data: data.assign_attrs(sagline_simulation_format=2),
+            lambda data: data.assign_attrs(sagline_simulation_format=3),
             ("sagline_simulation_format", None, None, "Install a newer sagline."),
         ),
         (

@@ -68,7 +68,7 @@ def encoder(
     counts = np.atleast_2d(sl.encoder_counts(plan, winding.value))
     whole = [[int(count) if count == count else count for count in row] for row in counts.tolist()]
     code = _write_rows(plan, "C{}", whole, out)
-    winches = plan.state.one_robot.winches
+    winches = plan.robot.winches
     if plan.path is None or winches is None or (winches.speed_limit is None and winches.torque_limit is None):
         return code
     with working(f"{file.name}: speeds and torques of the winches"):

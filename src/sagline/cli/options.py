@@ -261,6 +261,13 @@ WINCHES = choice(WinchModel.IDEAL, "WINCHES", "Model of the winches", WinchModel
 STEP: float | None = quantity(
     None, "TIME", "Time step of the integrator [s]. Default: a step that suits the robot.", "s", above=0.0
 )
+BASES: list[str] | None = option(
+    None,
+    "FILE=CABLES",
+    "Base that moves, such as a ship or a drone: its poses in .csv or .yaml, and the cables whose anchors it carries: "
+    "ship.csv=0,1,2,3. Poses are relative to the place in the robot file. The option can be repeated.",
+    "--base",
+)
 LOSS_TIME: float | None = quantity(
     None, "TIME", "Loss time [s] of the cable material: axial stiffness EA (1 + i omega TIME).", "s", low=0.0
 )

@@ -13,7 +13,7 @@ from sagline.cli import options as opt
 from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
 from sagline.cli.tension import reason
 from sagline.cli.terminal import ProgressLine, show_note, show_text, working
-from sagline.cli.track import load_path_near
+from sagline.cli.track import anchors_of, load_path_near
 from sagline.files.writing import file_stem
 
 if TYPE_CHECKING:
@@ -43,6 +43,8 @@ EVENT = ("time_s", "kind", "cable", "tension_before_n", "tension_after_n", "limi
 STEP = "Give the cable and the time of the break: --break 3@2.5s."
 
 
+_FIXED = opt.only_without("--base")  # the shaped frequencies are those of a robot with fixed anchors
+
 _BREAKS: list[str] | None = opt.option(
     None,
     "CABLE@TIME[@POSITION]",
@@ -61,7 +63,7 @@ def simulate(
     ),
     pose: Any = opt.if_only(opt.POSE, opt.only_without("PATH")),
     shaper: _ShaperKind = opt.choice(
-        _ShaperKind.NONE, "SHAPER", "Input shaper of the path", _ShaperKind, opt.only_with("PATH")
+        _ShaperKind.NONE, "SHAPER", "Input shaper of the path", _ShaperKind, _FIXED, opt.only_with("PATH")
     ),
     cable_mass: _CableMass = opt.choice(_CableMass.NONE, "KIND", "Model of the cable mass", _CableMass),
     winches: opt.WinchModel = opt.WINCHES,
@@ -73,6 +75,7 @@ def simulate(
     air_damping: float = opt.AIR_DAMPING,
     wrench: Any = opt.WRENCH,
     payload: float | None = opt.PAYLOAD,
+    bases: list[str] | None = opt.BASES,
     files: opt.Files = opt.Files(),
 ) -> int:
     """Simulate the motion of a robot along a path, with vibration, input shapers and breaking cables.
@@ -86,6 +89,7 @@ def simulate(
 
         sagline simulate article-suspended own_path.yaml --shaper zvd
         sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
+        sagline simulate cogiro own_path.yaml --base ship.csv=0,1,2,3 --winches robot
     """
     from sagline.dynamics.simulation.initial_conditions import initial_conditions
     from sagline.dynamics.simulation.simulate import NODES, losses_after_break
@@ -96,9 +100,9 @@ def simulate(
     damping = sl.Damping(loss_time or 0.0, air_damping)
     output = Output(files, file_stem(robot.name, "simulation"), [".nc"], ["-motion", "-energy"], ".csv")
     way = None if path is None else load_path_near(robot, path)
-    method = opt.tension_named(tension)
+    method, anchors = opt.tension_named(tension), anchors_of(robot, bases)
     with working(f"{robot.name}: simulating") as line:
-        start = _start(robot, way, pose, method, shaper, cable_mass, wrench, line)
+        start = _start(robot, way, pose, method, shaper, cable_mass, wrench, anchors, line)
         end = after if way is None else _duration(start) + after
         line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass.value)}")
         kind: Any = cable_mass.value
@@ -107,9 +111,8 @@ def simulate(
             given = initial_conditions(start, None, None, end)
             assumed = losses_after_break(given, NODES if cable_mass is _CableMass.LUMPED else 0)
             damping = sl.Damping(assumed.loss_time, air_damping)
-        simulation = sl.simulate(
-            start, duration=end, step=step, cable_mass=kind, winches=drives, events=events, damping=damping
-        )
+        options: Any = {"cable_mass": kind, "winches": drives, "events": events, "damping": damping}
+        simulation = sl.simulate(start, duration=end, step=step, anchors=anchors, **options)
         simulation.save(output.file(".nc"))
         output.table(".csv", simulation.table)
         line.stage("drawing")
@@ -142,11 +145,14 @@ def _start(
     shaper: _ShaperKind,
     cable_mass: _CableMass,
     load: Array | None,
+    anchors: sl.AnchorMotion | None,
     line: ProgressLine,
 ) -> sl.Plan | sl.Equilibrium:
     """The plan of the path `way` after input shaping. Without a path, the equilibrium at rest at `pose`."""
     if way is None:
         place = opt.middle_pose(robot) if pose is None else pose
+        if anchors is not None:
+            robot = robot.replace(frame_anchors=anchors.at(0.0))
         plan = sl.inverse(robot, place, tension=method, wrench=load)
         if not plan.feasible:
             text, _, why = reason(robot, place, plan).partition(". ")
@@ -163,7 +169,8 @@ def _start(
         kind = "with cable mass" if heavy else "massless"
         show_note("Shaper: ", f"{shaper.value} for {shaped_out} Hz ({kind}), at the end of the path")
         way = sl.shaped(way, {_ShaperKind.ZV: sl.ZV, _ShaperKind.ZVD: sl.ZVD, _ShaperKind.EI: sl.EI}[shaper](frequency))
-    return sl.inverse(robot, way, tension=method, wrench=load, progress=line.stage(f"{robot.name}: planning"))
+    progress = line.stage(f"{robot.name}: planning")
+    return sl.inverse(robot, way, tension=method, wrench=load, anchors=anchors, progress=progress)
 
 
 def _duration(start: sl.Plan | sl.Equilibrium) -> float:

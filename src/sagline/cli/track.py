@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
@@ -33,7 +34,13 @@ def track(
     variable: opt.TensionVariable = opt.VARIABLE,
     wrench: Any = opt.WRENCH,
     payload: float | None = opt.PAYLOAD,
-    uncertainty: bool = opt.flag(False, "Errors of poses and tensions due to the robot's tolerances.", "--uncertainty"),
+    uncertainty: bool = opt.flag(
+        False,
+        "Errors of poses and tensions due to the robot's tolerances.",
+        "--uncertainty",
+        opt.only_without("--base"),
+    ),
+    bases: list[str] | None = opt.BASES,
     files: opt.Files = opt.Files(),
 ) -> int:
     """Plan the cable lengths of a robot along a path, and confirm them with exact catenaries.
@@ -48,16 +55,17 @@ def track(
         sagline track article-suspended
         sagline track own_robot.yaml own_path.yaml --model empirical --out results
         sagline track cogiro own_samples.csv --payload 20 --csv
+        sagline track cogiro own_path.yaml --base ship.csv=0,1,2,3
     """
     machine = opt.robot_with_payload(robot, payload)
     way = sl.article_path() if path is None else load_path_near(machine, path)
-    cable = opt.model_named(model)
+    cable, anchors = opt.model_named(model), anchors_of(machine, bases)
     if uncertainty:  # refuse missing tolerances before any other work
         sl.inverse(machine, way.pose[:1], cable).uncertainty()
     tables = (".csv", "-uncertainty.csv")[: 1 + uncertainty]
     output = Output(files, run_name(machine, cable), [".nc"], [f"-{figure}" for figure in FIGURES], *tables)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses") as line:
-        run = ConfirmedRun.along(machine, way, cable, opt.tension_named(tension, variable), line, wrench)
+        run = ConfirmedRun.along(machine, way, cable, opt.tension_named(tension, variable), line, wrench, anchors)
         run = run._replace(uncertainty=run.plan.uncertainty() if uncertainty else None)
     with working("writing"):
         run.plan.save(output.file(".nc"))
@@ -80,6 +88,19 @@ def load_path_near(robot: sl.Robot, file: Path) -> sl.Path:
         )
         raise sl.FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
     return way
+
+
+def anchors_of(robot: sl.Robot, bases: Sequence[str] | None) -> sl.AnchorMotion | None:
+    """Motion of the anchors from the texts FILE=CABLES of the option --base; None without bases."""
+    found = []
+    for text in bases or ():
+        file, _, cables = text.rpartition("=")
+        numbers = cables.split(",")
+        if not file or not all(re.fullmatch(r"[0-9]{1,4}", number.strip()) for number in numbers):
+            step = "Give the file and the cables: --base ship.csv=0,1,2,3."
+            raise sl.InvalidValueError("--base", repr(text), "FILE=CABLES", step)
+        found.append((sl.load_path(file), [int(number) for number in numbers]))
+    return sl.anchors_on_bases(robot, found) if found else None
 
 
 def _figures(run: ConfirmedRun) -> tuple[FigureMaker, ...]:
@@ -144,13 +165,14 @@ class ConfirmedRun(NamedTuple):
         tension: sl.TensionMethod,
         line: ProgressLine,
         wrench: Array | None = None,
+        anchors: sl.AnchorMotion | None = None,
     ) -> ConfirmedRun:
         """Plan a path, and confirm the plan with exact cables."""
         # load the compiled kernels before the time is measured
         sl.inverse(robot, path.pose[:1], model, tension, wrench)
         start = perf_counter()
         progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
-        plan = sl.inverse(robot, path, model, tension, wrench, progress=progress)
+        plan = sl.inverse(robot, path, model, tension, wrench, anchors=anchors, progress=progress)
         seconds = perf_counter() - start
         return cls(sl.confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
 
@@ -182,7 +204,7 @@ def _gap_text(gap: sl.Gap, plan: sl.Plan) -> str:
     when = f"from {first} to {last}" if gap.last > gap.first else f"at {first}"
     if np.isnan(gap.shortfall):
         return f"{when}: {gap.status.text}"
-    count = plan.state.one_robot.cable_count
+    count = plan.robot.cable_count
     cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
         return f"{when}: no additional force alone is sufficient; limiting: {cables}"
@@ -218,7 +240,7 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
     """Table with one column per run and one row per number."""
     heads = [""]
     for run in runs:
-        name = fill(run.plan.state.one_robot.name, WIDE, break_long_words=False, break_on_hyphens=False)
+        name = fill(run.plan.robot.name, WIDE, break_long_words=False, break_on_hyphens=False)
         how = fill(run.plan.method, NARROW, break_on_hyphens=False)
         heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}\n{how}")
     numbers = [run.summary() for run in runs]
@@ -231,7 +253,7 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
 
 def _complaints(run: ConfirmedRun) -> int:
     """Print the infeasible parts of the path of `run`. Returns the exit code."""
-    name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
+    name, gaps, plan = run.plan.robot.name, run.plan.gaps, run.plan
     for gap in gaps[:MOST_GAPS]:
         left = "is unstable" if gap.status is sl.PoseStatus.UNSTABLE else "leaves the feasible region"
         show_note(f"{name}: ", f"the path {left} {_gap_text(gap, plan)}", style="bold red")
@@ -250,7 +272,7 @@ def _record(run: ConfirmedRun) -> dict[str, Any]:
     plan = run.plan
     clock = plan.path.time if plan.path is not None else None
     return {
-        "robot": plan.state.one_robot.name,
+        "robot": plan.robot.name,
         "model": type(plan.state.cables.model).__name__,
         "tension": type(plan.tension).__name__,
         "tension_variable": plan.tension.variable,

@@ -202,7 +202,7 @@ def _played_in(robot: sl.Robot, file: Path) -> Played:
         _check_robot(file, "simulation", simulation.robot, robot)
         return PlayedSimulation(simulation)
     plan = sl.load_plan(file)
-    made_for = plan.state.one_robot
+    made_for = plan.robot
     _check_robot(file, "run", made_for, robot)
     count = len(plan.state.pose) if plan.state.pose.shape else 1
     with working(f"{made_for.name}: confirming {count:,} poses") as line:

@@ -17,9 +17,10 @@ from sagline.files.variables import SOLVED, SOMEWHERE, STEP, Quantity
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path
-from sagline.robot.batch import has_routing
+from sagline.robot.batch import Robots, has_routing
 from sagline.robot.equilibrium import Contact, Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.robot import with_anchors
 from sagline.tension.methods import methods_by_name
 
 if TYPE_CHECKING:
@@ -138,6 +139,7 @@ def _check_plan(data: Dataset, cables: int) -> None:
     quantities = sorted((*QUANTITIES, *machine, *motion, *optional), key=lambda one: one.codes is None)  # codes first
     solved = np.isin(status.values, BALANCED)
     v.check_variables(data, quantities, {"cable": cables, "pose": status.size}, rows, solved)
+    v.check_anchors(data, cables)
 
 
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
@@ -148,7 +150,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     NaN. A digest of all values and attributes follows the NetCDF data. The digest detects later changes of the file.
 
     Args:
-        plan: A plan of one robot.
+        plan: A plan of one robot, with fixed or moving anchors.
         file: The file, for example "run.nc". An existing regular file is replaced; any other target is refused.
 
     Raises:
@@ -193,15 +195,17 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
 
 def plan_dataset(plan: Plan) -> Dataset:
     """Create the data set of a plan of one robot. The robot is stored as an attribute."""
-    robot, rows = plan.state.one_robot, ("pose",) * len(plan.state.pose.shape)
+    robot, rows = plan.robot, ("pose",) * len(plan.state.pose.shape)
     cables = robot.cable_count
     machine = () if plan.state.contact is None else MACHINE
     variables = v.variables_of_result(plan, (*QUANTITIES, *machine, WINDING, AZIMUTH, *PROOF, *MOTION, JERK), rows)
+    variables |= v.variables_of_result(plan, v.ANCHORS)
     coordinates = {"cable": index_coordinate("cable", cables), **v.variables_of_result(plan, (TIME,), rows)}
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "times of rest of the platform"})
     choices = choice_attributes("model", plan.state.cables.model, models_by_name())
     choices |= choice_attributes("tension", plan.tension, methods_by_name())
+    choices[FORMAT.key] = FORMAT.version - (plan.anchors is None)
     data = FORMAT.dataset(f"Cable lengths and tensions of {robot.name}", robot, choices, variables, coordinates)
     _check_plan(data, cables)
     return data
@@ -216,7 +220,7 @@ def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
         said, has = ("is", "none of its") if behind else ("is not", "some of its")
         raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", FORMAT.again)
     found = v.fields_of(data, (*QUANTITIES, *MACHINE, WINDING, AZIMUTH, TIME, *MOTION, JERK))
-    state, motion = found["state"], found.get("path")
+    state, motion, anchors = found["state"], found.get("path"), v.anchors_of(data)
     pose = Pose.from_quaternion(**state["pose"])
     spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # values of the free span
     cables = CableState(
@@ -231,12 +235,16 @@ def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
         contact = Contact(wrap_angle=found["wrap_angle"], chord_tension=found["chord_tension"], **state["contact"])
     if motion is not None:
         motion = Path(pose=pose, **motion, rests=v.values_of(data, RESTS) if RESTS in data.variables else None)
+    placed: Robots = robot
+    if anchors is not None and motion is not None:
+        placed = with_anchors(robot, anchors._of(robot, motion.time))
     return Plan(
-        state=Equilibrium(robot, pose, state["wrench"], cables, contact),
+        state=Equilibrium(placed, pose, state["wrench"], cables, contact),
         path=motion,
         tension=choice_of(path, data.attrs, "tension", methods_by_name()),
         **{name: found[name] for name in ("status", "shortfall", "wrench_residual", "blocking")},
         **v.fields_of(data, PROOF),
+        anchors=anchors,
     )
 
 
@@ -247,7 +255,7 @@ FORMAT: Final = Format(
     give="Give the .nc file that sagline track wrote.",
     again="Run sagline track again, or get the original file.",
     key="sagline_format",
-    version=2,  # version 2 added the digest
+    version=3,  # version 2 added the digest; version 3, moving anchors, which other plans do not need
     pack=plan_dataset,
     unpack=plan_of_dataset,
 )

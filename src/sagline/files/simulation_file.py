@@ -84,6 +84,7 @@ def _check_simulation(data: Dataset, cables: int) -> None:
     sizes = {"cable": cables, ROWS: time.size, **{name: data.sizes.get(name, 0) for name in ("node", "event")}}
     nodes = (NODES,) if NODES.name in data.variables else ()
     v.check_variables(data, (TIME, *SAMPLES, *nodes), sizes, (ROWS,))
+    v.check_anchors(data, cables)
     if LARGEST.name in data.variables:
         v.check_variables(data, (LARGEST,), sizes)
     _check_times(time)
@@ -207,7 +208,7 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
 def _pack(simulation: Simulation) -> Dataset:
     """Create the data set of a simulation. Dimensions: time, cable and event; for cables with mass, node."""
     variables = v.variables_of_result(simulation, (*SAMPLES, NODES), (ROWS,)) | v.variables_of_result(
-        simulation, (LARGEST,)
+        simulation, (LARGEST, *v.ANCHORS)
     )
     if simulation.events:
         some = any(event.limit for event in simulation.events)
@@ -222,6 +223,7 @@ def _pack(simulation: Simulation) -> Dataset:
         **attributes_with_units(simulation, {"step": "s"}),
         **({"winches": LAGGING, **attributes_with_units(winches, LAG)} if lagging else {"winches": winches}),
         "winding": simulation.winding,
+        FORMAT.key: FORMAT.version - (simulation.anchors is None),
         **attributes_with_units(instance(simulation.damping, Damping, "damping"), LOSSES),
     }
     robot = simulation.robot
@@ -248,6 +250,7 @@ def _unpack(path: FilePath, data: Dataset) -> Simulation:
         step=float(attributes["step"]),
         winches=winches,
         damping=Damping(**{name: float(attributes[name]) for name in LOSSES}),
+        anchors=v.anchors_of(data),
         **settings,
         **found,
     )
@@ -260,7 +263,7 @@ FORMAT: Final = Format(
     give="Give a .nc file of Simulation.save.",
     again="Save the simulation again, or get the original file.",
     key="sagline_simulation_format",
-    version=1,
+    version=2,  # version 2 added moving anchors, which other simulations do not need
     pack=_pack,
     unpack=_unpack,
 )

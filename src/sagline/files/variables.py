@@ -11,6 +11,7 @@ import numpy as np
 
 from sagline.core.arrays import Flags, locked
 from sagline.core.errors import InvalidValueError, printable
+from sagline.motion.anchors import AnchorMotion
 
 if TYPE_CHECKING:
     from xarray import Dataset, Variable
@@ -125,6 +126,32 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
                 branch = branch.setdefault(part, {})
             branch[name] = values_of(data, one.name)
     return found
+
+
+ANCHORS: Final = (
+    Quantity("anchor_time", ("anchor_sample",), "s", "time of the samples of moving frame anchors", "anchors.time"),
+    Quantity(
+        "anchor_position",
+        ("anchor_sample", "cable", "axis"),
+        "m",
+        "positions of moving frame anchors in the world; cubic splines between the samples",
+        "anchors.position",
+    ),
+)
+
+
+def check_anchors(data: Dataset, cables: int) -> None:
+    """Refuse a data set whose moving anchors, if any, have another number of cables, or wrong values."""
+    if any(one.name in data.variables for one in ANCHORS):
+        if "time" not in data.variables:
+            raise InvalidValueError("time", "not given", "given with moving anchors", STEP)
+        check_variables(data, ANCHORS, {"anchor_sample": data.sizes.get("anchor_sample", 0), "cable": cables})
+
+
+def anchors_of(data: Dataset) -> AnchorMotion | None:
+    """Moving anchors in a data set; None for fixed anchors."""
+    found = fields_of(data, ANCHORS)
+    return AnchorMotion(**found["anchors"]) if found else None
 
 
 def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import brief, callback, choice, flag
+from sagline.core.arguments import brief, callback, choice, flag, instance
 from sagline.core.arrays import Array, Indices, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
@@ -24,12 +24,13 @@ from sagline.kinematics.inverse_rows import Given, InverseRows
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.slanted import solve_slanted_axes
 from sagline.kinematics.status import PoseStatus
+from sagline.motion.anchors import AnchorMotion
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of, has_routing, has_slanted_axes, one_a_pose
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import ROUNDING, check_reach
-from sagline.robot.robot import Robot
+from sagline.robot.robot import Robot, with_anchors
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
 from sagline.statics.tables import pose_rows, refuse_missing_chords, robot_terms
@@ -56,6 +57,7 @@ def inverse(
     stability: bool = True,
     given: Sequence[Given] | None = None,
     level: float = 0.0,
+    anchors: AnchorMotion | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Tensions that balance the platform within their limits, and the corresponding unstrained lengths.
@@ -84,6 +86,8 @@ def inverse(
             the previous sample.
         level: Tension level of an underconstrained platform [N]: component of the chord tensions along the unit vector
             of the tensions that have the least effect on the platform.
+        anchors: Motion of the frame anchors, in place of those of the robot, for a path within its times. The path
+            remains a motion in the world.
         progress: Function that is called several times per second. The arguments are the number of finished poses and
             the number of all poses. A pose is finished if it is solved, or infeasible for a known reason.
 
@@ -95,8 +99,9 @@ def inverse(
     Raises:
         InvalidValueError: If `given` does not fit a robot with fewer cables than degrees of freedom. If `tension` does
             not support the number of cables. If several robots do not fit together: the message names the property that
-            differs. If `winding` is "path" for poses without times. If an argument has the wrong type or shape. If a
-            pose is outside the motions of the robot's pattern. If the poses need more memory than is free.
+            differs. If `winding` is "path", or `anchors` is given, for poses without times. If the path is outside the
+            times of `anchors`. If an argument has the wrong type or shape. If a pose is outside the motions of the
+            robot's pattern. If the poses need more memory than is free.
         CableGeometryError: If a cable has no chord at some pose, because its ends coincide or its platform end is
             inside its pulley.
 
@@ -116,8 +121,10 @@ def inverse(
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion
     robots = one_a_pose(robot, len(pose) if pose.shape else None)
+    places = None if anchors is None else _anchors_along(anchors, robots, motion)
+    placed = robots if places is None else with_anchors(first_of(robots), places)
     shared = first_of(robots)
-    _check_poses(robots, pose)
+    _check_poses(placed, pose)
     values = inverse_rows.given_codes(shared, given)
     options = kernel_options(robots, model, method) if values is None else None
     rows, path = pose_rows(pose), motion if isinstance(motion, Path) else None
@@ -142,24 +149,27 @@ def inverse(
         inverse_rows.decide_rows(terms, options, some, acting, found, report)
         return found, some
 
-    found, rows = solve_slanted_axes(robots, model, pose, solve, stability) if slanted else solve(robot_terms(robots))
+    if slanted:
+        found, rows = solve_slanted_axes(placed, model, pose, solve, stability)
+    else:
+        found, rows = solve(robot_terms(robots, anchors=places))
     if options is None:
         pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
     if (found.pose_status == codes.POSE_NO_CHORD).any():
-        refuse_missing_chords(robots, pose)
+        refuse_missing_chords(placed, pose)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
 
     def equilibrium() -> Equilibrium:
         cables, contact = cables_of_results(robots, model, found.results, found.cable_status, pose.shape)
-        return with_routing(Equilibrium(robots, pose, whole, cables, contact), direction)
+        return with_routing(Equilibrium(placed, pose, whole, cables, contact), direction)
 
     state = equilibrium()
     if found.reject_slack(state.unstrained_length):
         state = equilibrium()
     if stability:
-        inverse_rows.decide_stability(robots, (model.code, *model.parameters), rows, found)
-    plan = _plan_of(state, path, tension, found)
+        inverse_rows.decide_stability(placed, (model.code, *model.parameters), rows, found)
+    plan = _plan_of(state, path, tension, found, anchors)
     return plan if winding is None or turning is not None else _with_path_friction(plan)
 
 
@@ -177,7 +187,23 @@ def _load_of(robots: Robot | tuple[Robot, ...], pose: Pose, path: Path | None, w
     return load if path is None else locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
 
 
-def _plan_of(state: Equilibrium, path: Path | None, tension: TensionMethod, found: inverse_rows.InverseRows) -> Plan:
+def _anchors_along(anchors: AnchorMotion, robots: Robot | tuple[Robot, ...], motion: Path | Pose) -> Array:
+    """Positions (N, m, 3) [m] of the moving anchors of one robot along a path."""
+    if not isinstance(robots, Robot):
+        raise InvalidValueError("anchors", "given for several robots", "None, or one robot", "Give a single robot.")
+    if not isinstance(motion, Path):
+        step = "Plan along a Path, or give robot.replace(frame_anchors=anchors.at(time))."
+        raise InvalidValueError("anchors", "given for poses without times", "None, or a path", step)
+    return instance(anchors, AnchorMotion, "anchors")._of(robots, motion.time)
+
+
+def _plan_of(
+    state: Equilibrium,
+    path: Path | None,
+    tension: TensionMethod,
+    found: inverse_rows.InverseRows,
+    anchors: AnchorMotion | None,
+) -> Plan:
     """Plan from the rows `found`, with the shape of the poses."""
     shared, shape = first_of(state.robot), state.pose.shape
     return Plan(
@@ -193,6 +219,7 @@ def _plan_of(state: Equilibrium, path: Path | None, tension: TensionMethod, foun
         bracket=locked(found.brackets.reshape(*shape, 2)),
         relief=locked(np.ascontiguousarray(_in_world(found.reliefs, shared)[:, :3]).reshape(*shape, 3)),
         at_border=locked(found.at_border.reshape(shape)),
+        anchors=anchors,
     )
 
 

@@ -125,13 +125,16 @@ def solve_inverse_rows(
     found, last = InverseRows.empty(robot, len(rows)), np.array(np.atleast_2d(reference)[0])
     memory, otherwise = memory_for(last.size), None if takes_default_kernel(method) else True
     terms = robot_terms(robot) if terms is None else terms
-    given = (*options, terms, rows, loads, last, memory, otherwise, stability, found.answers)
-    done = 0
+    (freedom, bodies, cables), done = terms, 0
     for part in blocks(len(rows), BLOCK if reference.ndim == 1 else 1):
         if reference.ndim > 1:
             last[:] = reference[part.start]
+            if isinstance(robot, Robot) and len(cables) > 1:  # moving anchors; the kernel reads the whole table
+                terms = freedom, bodies, cables[part]
         if swivels is None:
-            inverse_poses(*given, part.start, part.stop)
+            inverse_poses(
+                *options, terms, rows, loads, last, memory, otherwise, stability, found.answers, part.start, part.stop
+            )
         else:
             of_slanted = (*options, terms, swivels, rows, loads, last, memory, found.answers)
             inverse_poses_of_slanted(*of_slanted, part.start, part.stop)

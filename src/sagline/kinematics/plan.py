@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.cables.model import CableStatus
-from sagline.core.arrays import Array, Codes, Flags, locked
+from sagline.core.arrays import Array, Codes, locked
 from sagline.core.results import Result, Saved
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import tables
@@ -20,14 +20,16 @@ from sagline.kinematics.frame_forces import FrameForces, frame_forces_of
 from sagline.kinematics.inverse_rows import solve_inverse_rows
 from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.kinematics.uncertainty import Uncertainty
+from sagline.motion.anchors import AnchorMotion
 from sagline.motion.path import Path, spline_rates
 from sagline.robot.batch import Robots, first_of, has_slanted_axes
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, is_underconstrained, turn_in_words
+from sagline.robot.robot import Robot, with_anchors
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import inertial_wrench
-from sagline.statics.tables import pose_rows
+from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import TensionMethod, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
@@ -95,6 +97,8 @@ class Plan(Result, Saved, Tabular):
         at_border: True for feasible poses at which the iterations found no tensions, close to the border of
             feasibility, shape () or (N,). The tensions at such poses balance the platform, but the tension distribution
             method did not select the tensions. None for a plan from an old file.
+        anchors: Motion of the frame anchors; None for fixed anchors. With moving anchors, `state.robot` has one robot
+            per pose, whose frame anchors are those at its time.
     """
 
     _columns: ClassVar[Columns] = (
@@ -117,6 +121,16 @@ class Plan(Result, Saved, Tabular):
     bracket: Array | None = None
     relief: Array | None = None
     at_border: NDArray[np.bool_] | None = None
+    anchors: AnchorMotion | None = None
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of all poses; with moving anchors, the robot at the first pose.
+
+        Raises:
+            InvalidValueError: If the plan has one robot per pose that differ by more than moving anchors.
+        """
+        return self.state.one_robot if self.anchors is None else first_of(self.state.robot)
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -172,10 +186,10 @@ class Plan(Result, Saved, Tabular):
     def length_rate(self) -> Array | None:
         """Rate dL/dt of `unstrained_length` along the path [m/s], shape (N, m); None without a path.
 
-        The rate is due to platform motion and tension changes; NaN where the plan has no solution. Each call computes
+        The rate is due to changes of pose, anchors and tension; NaN where the plan has no solution. Each call computes
         the rates again. See docs/model.md, section 7.
         """
-        return None if self.path is None else _length_rate(self.state, self.path, self.tension, self.feasible)
+        return None if self.path is None else _length_rate(self, self.path)
 
     @property
     def stiffness_min(self) -> Array:
@@ -293,7 +307,7 @@ class Plan(Result, Saved, Tabular):
         )
 
 
-def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
+def _length_rate(plan: Plan, path: Path) -> Array:
     """Rates of the unstrained lengths (N, m) along `path`; NaN where the plan has no solution.
 
     The rates are accurate to 1e-8 of the largest rate. At the border of feasibility, the rates have first order.
@@ -304,7 +318,8 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
     # each sample, in both cases relative to the tensions at the sample. At a discontinuity of the rate, for example
     # where a cable reaches a limit, the value belongs to one side of the discontinuity. The rates of an
     # underconstrained platform follow from a spline through its lengths. See docs/model.md, section 7.
-    kept, rates = np.flatnonzero(feasible), np.full(state.cables.shape, np.nan)
+    state, tension, anchors = plan.state, plan.tension, plan.anchors
+    kept, rates = np.flatnonzero(plan.feasible), np.full(state.cables.shape, np.nan)
     # the platform also turns by an angle that the path does not contain, or the exit points need passes of their own
     if is_underconstrained(first_of(state.robot)) or has_slanted_axes(state.robot):
         for part in np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1):
@@ -312,12 +327,14 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
                 rates[part] = spline_rates(path.time[part], state.unstrained_length[part])[0]
         return locked(rates)
     closest = isinstance(tension, Closest)
-    motion, step = _motion_near(state.robot, path, state.wrench, ONE_SIDED if closest else 1.0)
+    robot = state.robot if anchors is None else plan.robot
+    motion, step = _motion_near(robot, path, state.wrench, ONE_SIDED if closest else 1.0, anchors)
     reference = shared_tension(state, tension.variable) if closest else np.full(state.cables.shape[-1], np.nan)
 
     def lengths(h: float) -> Array:
         """Unstrained lengths (N, m) at the time `h` after each sample."""
-        return lengths_near(state, tension, *motion(h), reference)
+        places = None if anchors is None else anchors._interpolated(path.time + h, 0)
+        return lengths_near(state, tension, *motion(h), reference, places)
 
     now, after = state.unstrained_length, lengths(step)
     if closest:  # a step backward would cross active limits
@@ -333,19 +350,24 @@ def _length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasibl
     return locked(rates)
 
 
-def lengths_near(state: Equilibrium, tension: TensionMethod, pose: Pose, wrench: Array, reference: Array) -> Array:
-    """Unstrained lengths (N, m) at poses near a state, with its guides and friction; reference: for `Closest`."""
-    options = kernel_options(state.robot, state.cables.model, tension)
-    found = solve_inverse_rows(state.robot, tension, options, pose_rows(pose), locked(wrench), reference)
+def lengths_near(
+    state: Equilibrium, tension: TensionMethod, pose: Pose, wrench: Array, reference: Array, places: Array | None = None
+) -> Array:
+    """Unstrained lengths (N, m) at poses near a state, with its guides and friction."""
+    # reference: for `Closest`; places: positions of moving anchors (N, m, 3)
+    robot = state.robot if places is None else first_of(state.robot)
+    options, terms = kernel_options(robot, state.cables.model, tension), robot_terms(robot, anchors=places)
+    found = solve_inverse_rows(robot, tension, options, pose_rows(pose), locked(wrench), reference, terms=terms)
     if state.contact is None:
         bare: Array = found.results[tables.LENGTH]
         return bare
-    reached = cables_of_results(state.robot, state.cables.model, found.results, found.cable_status, pose.shape)
-    return with_routing(Equilibrium(state.robot, pose, wrench, *reached), state.contact.winding).unstrained_length
+    reached = cables_of_results(robot, state.cables.model, found.results, found.cable_status, pose.shape)
+    placed = robot if places is None else with_anchors(first_of(robot), places)
+    return with_routing(Equilibrium(placed, pose, wrench, *reached), state.contact.winding).unstrained_length
 
 
 def _motion_near(
-    robot: Robots, path: Path, wrench: Array, longer: float
+    robot: Robots, path: Path, wrench: Array, longer: float, anchors: AnchorMotion | None
 ) -> tuple[Callable[[float], tuple[Pose, Array]], float]:
     """A function that returns poses and wrenches at a time after each sample of `path`, and a time step [s] for it."""
     # wrench: external plus inertial wrench at the samples, (N, 6); a spline interpolates its external part; longer:
@@ -362,7 +384,10 @@ def _motion_near(
         return pose, inertial + external + h * external_rate
 
     # a small share of two times: for a change by 1 m or 1 rad, and between samples
-    sizes = (float(np.abs(rate).max()) for rate in (path.twist, path.twist_rate, jerk))
+    moved = [[path.twist, path.twist_rate, jerk]]
+    if anchors is not None:
+        moved.append([anchors._interpolated(path.time, order) for order in (1, 2, 3)])
+    sizes = (max(float(np.abs(rate).max()) for rate in rates) for rates in zip(*moved, strict=True))
     quickest = max(size ** (1.0 / order) for order, size in enumerate(sizes, start=1))
     between = float(np.diff(path.time).min()) if len(path) > 1 else 1.0
     return at, min(LONGEST * between, longer * SHARE / quickest if quickest > 0.0 else np.inf)

@@ -67,7 +67,7 @@ def encoder_counts(
     Source:
         docs/model.md, section 10.
     """
-    robot = instance(plan, Plan, "plan").state.one_robot
+    robot = instance(plan, Plan, "plan").robot
     choice(winding, "winding", get_args(Winding))
     optional(creep, Creep, "creep")
     drums = drums_of(robot)
@@ -263,7 +263,7 @@ def winch_rates(plan: Plan) -> WinchRates:
     Source:
         docs/model.md, section 10.
     """
-    robot, rate = instance(plan, Plan, "plan").state.one_robot, plan.length_rate
+    robot, rate = instance(plan, Plan, "plan").robot, plan.length_rate
     if plan.path is None or rate is None:
         raise InvalidValueError("plan", "a plan of poses without times", "a plan along a path", "Plan along a Path.")
     winches, stretch, lever = _levers(robot, plan.unstrained_length)

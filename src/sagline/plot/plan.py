@@ -201,7 +201,7 @@ def errors(*confirmations: Confirmation) -> Figure:
     panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _draw_errors(ax, confirmation)
-        ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
+        ax.set_title(confirmation.plan.robot.name, fontsize=current().tick)
         sheet.hide_shared_labels(ax)
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _write_flat_error(ax, confirmation)  # all panels have this scale
@@ -256,7 +256,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
         >>> figure = sl.plot.small_multiples(plan)
     """
     values, label = _values(plan, quantity, TENSIONS | LENGTHS)
-    (clock, axis), robot, count = abscissa(plan), plan.state.one_robot, values.shape[1]
+    (clock, axis), robot, count = abscissa(plan), plan.robot, values.shape[1]
     columns = min(count, 2 if current().narrow else 4)
     rows = ceil(count / columns)
     figure = sheet.sheet(0.4 + rows * ROW_HEIGHT)

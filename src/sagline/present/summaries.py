@@ -23,6 +23,7 @@ from sagline.kinematics.forward_rows import ForwardSolution
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
+from sagline.motion.anchors import AnchorMotion
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
@@ -151,7 +152,7 @@ def middle_plan(robot: Robot) -> Plan | None:
 
 @summary_of.register
 def _(plan: Plan) -> Summary:
-    feasible, name = np.atleast_1d(plan.feasible), plan.state.one_robot.name
+    feasible, name = np.atleast_1d(plan.feasible), plan.robot.name
     good, count = bool(plan.solved.all()), feasible.size
     how = f"{plan.method}, {word_of(type(plan.state.cables.model).__name__)}"
     lines = [f"chord tensions {_range(plan.chord_tension)} ({how})" if feasible.any() else how]
@@ -202,7 +203,7 @@ def _(proof: Confirmation) -> Summary:
     largest = float(np.nanmax(away, initial=0.0))
     verdict = f"{int(held.sum()):,} of {int(planned.sum()):,} planned poses are confirmed"
     line = f"largest position error {n(largest, '.2g', 'mm', size=size)}"
-    return Summary(f"Confirmation of {proof.plan.state.one_robot.name}", verdict, good, (line,))
+    return Summary(f"Confirmation of {proof.plan.robot.name}", verdict, good, (line,))
 
 
 @summary_of.register
@@ -276,6 +277,14 @@ def _(path: Path) -> Summary:
     length = float(np.linalg.norm(np.diff(path.pose.position, axis=0), axis=1).sum())
     span = float(path.time[-1] - path.time[0])
     return Summary("Path", f"{len(path):,} poses, {n(span, '.4g', 's')}, {n(length, '.4g', 'm')}", None, ())
+
+
+@summary_of.register
+def _(anchors: AnchorMotion) -> Summary:
+    samples, cables, _ = anchors.position.shape
+    span, speed = float(np.ptp(anchors.time)), np.linalg.norm(anchors.velocity(anchors.time), axis=-1).max()
+    said = f"{samples:,} samples of {cables} anchors, {n(span, '.4g', 's')}, up to {n(float(speed), '.3g', 'm/s')}"
+    return Summary("Motion of anchors", said, None, ())
 
 
 @summary_of.register

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,8 +176,8 @@ def pulley_centers(robot: Robot, pose: Pose) -> Array:
     return locked(centers)
 
 
-def dead_cable(robot: Robots) -> Array:
-    """Dead length of each cable [m], (m,) or (N, m); a length off the drum cannot be shorter."""
+def dead_cable(robot: Robots, name: Literal["dead_cable", "dead_rise"] = "dead_cable") -> Array:
+    """Dead length of each cable, or its rise [m], (m,) or (N, m); a length off the drum cannot be shorter."""
     if not isinstance(robot, Robot):
-        return np.stack([dead_cable(one) for one in robot])
-    return np.zeros(robot.cable_count) if robot.winches is None else robot.winches.dead_cable
+        return np.stack([dead_cable(one, name) for one in robot])
+    return np.zeros(robot.cable_count) if robot.winches is None else np.asarray(getattr(robot.winches, name))

@@ -14,6 +14,7 @@ from sagline.core.arrays import Array, checked, kernel_input, locked, refuse_fir
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable import drum
 from sagline.kernels.codes import CATENARY
+from sagline.robot.batch import cables_of, dead_cable, robot_fields
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.routing import actual_routing, differs, tension_after
@@ -208,16 +209,16 @@ def drum_tension(state: Equilibrium) -> Array:
     drum downward has a negative tension. A tension that would give a negative length is NaN. See docs/model.md, section
     10.
     """
-    robot, cables = state.one_robot, state.cables
+    robot, cables = state.robot, state.cables
     if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
         return locked(actual_routing(state)[-1])
     if cables.model.code != CATENARY:
         return state.chord_tension
-    height = robot.frame_anchors[:, 2]
-    drum_height = height if robot.winches is None else height - robot.winches.dead_rise
-    fall = state.exit_point[..., 2] - drum_height
-    stiffness = robot.cables.axial_stiffness
-    drop = 2.0 * robot.cables.linear_density * robot.gravity * fall / stiffness
+    (anchors,) = robot_fields(robot, "frame_anchors")
+    fall = state.exit_point[..., 2] - anchors[..., 2] + dead_cable(robot, "dead_rise")
+    material = cables_of(robot)
+    stiffness = material.axial_stiffness
+    drop = 2.0 * material.linear_density * cables.gravity * fall / stiffness
     return locked(tension_after(cables.frame_end_tension, drop, stiffness))
 
 

@@ -242,6 +242,19 @@ def with_mass(robot: Robot, mass: float) -> Robot:
     return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))
 
 
+def with_anchors(robot: Robot, places: Array) -> tuple[Robot, ...]:
+    """Copies of a checked robot without guides, with the frame anchors `places` (N, m, 3) [m], not checked again."""
+    copies = tuple(object.__new__(Robot) for _ in places)
+    names: tuple[str, ...] = Robot.__slots__
+    for name in names:
+        fill, value = getattr(Robot, name).__set__, getattr(robot, name)
+        for copy in copies:
+            fill(copy, value)
+    for copy, place in zip(copies, places, strict=True):
+        set_fields(copy, frame_anchors=place)
+    return copies
+
+
 def without_cables(robot: Robot, *cables: int) -> Robot:
     """Robot after the failure of some cables. The broken cables do not load the platform with their weight.
 

@@ -16,6 +16,7 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.kernels.cable import geometry
 from sagline.kinematics.plan import Gap, Plan
 from sagline.kinematics.status import PoseStatus
+from sagline.motion.anchors import refuse_moving
 from sagline.robot.batch import dead_cable, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -47,6 +48,7 @@ class SharedMotion:
     @classmethod
     def of_plan(cls, plan: Plan) -> SharedMotion:
         """Samples of a plan of N poses. Without times, the interval between poses is one second."""
+        refuse_moving(plan.anchors, "run")
         count = len(plan.state.pose)
         time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
         verdicts: list[tuple[bool | None, str]] = [(True, "Feasible")]
@@ -67,6 +69,7 @@ class SharedMotion:
     @classmethod
     def of_simulation(cls, simulation: Simulation) -> SharedMotion:
         """Samples of a simulation. Each cable with mass is drawn as a catenary at rest of the same length."""
+        refuse_moving(simulation.anchors, "simulation")
         robot, time = simulation.robot, simulation.time
         broken = np.zeros_like(simulation.tensions, dtype=bool)
         verdicts: list[tuple[bool | None, str]] = [(None, "Simulated")]

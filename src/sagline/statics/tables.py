@@ -10,7 +10,7 @@ from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
-from sagline.kernels.tables import SHORTEST_CHORD
+from sagline.kernels.tables import FRAME_X, FRAME_Z, SHORTEST_CHORD
 from sagline.robot.batch import Robots, first_of, has_slanted_axes, pulleys_of, refuse_slanted
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -57,9 +57,16 @@ def pose_rows(pose: Pose) -> Array:
     return locked(rows)
 
 
-def robot_terms(robot: Robots, slanted: bool = False) -> tuple[Array, Array, Array]:
-    """Arrays of one or several robots for kernels: matrix of free motions (n, 6), `body_table` and `cable_table`."""
-    return first_of(robot).freedom, body_table(robot), cable_table(robot, slanted)
+def robot_terms(robot: Robots, slanted: bool = False, anchors: Array | None = None) -> tuple[Array, Array, Array]:
+    """Arrays of one or several robots for kernels: matrix of free motions (n, 6), `body_table` and `cable_table`.
+
+    anchors: frame anchors of one robot at N poses, (N, m, 3) [m]; None for those of the robots.
+    """
+    table = cable_table(robot, slanted)
+    if anchors is not None:
+        table = np.repeat(table, len(anchors), axis=0)
+        table[..., FRAME_X : FRAME_Z + 1] = anchors
+    return first_of(robot).freedom, body_table(robot), locked(table)
 
 
 def _cable_rows(robot: Robot, pulleys: tuple[Array, Array]) -> Array:

@@ -14,6 +14,7 @@ from sagline.core.progress import Progress
 from sagline.dynamics.simulation.results import Occurrence, Simulation
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.plan import Plan
+from sagline.motion.anchors import refuse_moving
 from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
@@ -43,6 +44,7 @@ class PlayedPlan(Played):
 
     def __init__(self, plan: Plan, progress: Progress | None = None) -> None:
         """Confirm the poses with exact cables."""
+        refuse_moving(plan.anchors, "run")
         if not plan.state.pose.shape:
             raise InvalidValueError(
                 "run", "a plan of a single pose", "a plan of poses in a row", "Save a plan of a path."
@@ -105,6 +107,7 @@ class PlayedSimulation(Played):
 
     def __init__(self, simulation: Simulation) -> None:
         """Play a simulation."""
+        refuse_moving(simulation.anchors, "simulation")
         self.simulation, self.robot = simulation, simulation.robot
         self.time = np.asarray(simulation.time - simulation.time[0])
         self.tension = simulation.tensions.copy()  # NaN after a break

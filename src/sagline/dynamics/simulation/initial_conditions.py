@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
+from sagline.core.arguments import optional
 from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
@@ -16,6 +17,7 @@ from sagline.kernels.dynamics.progress import CubicTableArrays
 from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
+from sagline.motion.anchors import AnchorMotion
 from sagline.motion.path import checked_time
 from sagline.robot.batch import dead_cable
 from sagline.robot.drum import drum_tension
@@ -154,6 +156,8 @@ class TimeTable:
         return TimeTable(table.time, value, begin, end)
 
 
+FIXED = TimeTable.constant(np.zeros(0))  # positions of anchors that do not move
+SAME_PLACE = 1e-6  # positions of anchors count as equal up to this distance [m]
 ROUNDING = 1e-12  # forces and moments below this share of the largest force and moment count as zero
 
 
@@ -172,12 +176,32 @@ class InitialConditions:
     wrench: TimeTable  # external wrench on the platform
     begin: float  # first time [s]
     end: float  # last time of the inputs [s]
+    frames: Array  # frame anchors [m] along the motion, at `poses`: (m, 3) or (P, m, 3)
+    anchors: AnchorMotion | None  # motion of the frame anchors
+
+    @property
+    def places(self) -> TimeTable:
+        """Time table of the positions of moving anchors (K, 3 m); no columns for fixed anchors."""
+        if (moved := self.anchors) is None:
+            return FIXED
+        value, rate = (array(moved.time).reshape(moved.time.size, -1) for array in (moved.at, moved.velocity))
+        span = moved.time[-1] - moved.time[0]  # beyond the end of its table, it would have no velocity
+        time, last = np.append(moved.time, moved.time[-1] + span), value[-1:] + span * rate[-1:]
+        return TimeTable.cubic(time, np.concatenate((value, last)), np.concatenate((rate, rate[-1:])))
 
 
 def initial_conditions(
-    start: Any, unstrained_length: Any, wrench: Any, duration: Any, pose: PoseLike | None = None
+    start: Any,
+    unstrained_length: Any,
+    wrench: Any,
+    duration: Any,
+    pose: PoseLike | None = None,
+    anchors: AnchorMotion | None = None,
 ) -> InitialConditions:
     """Check the initial conditions and inputs of `simulate`; `duration` in s."""
+    moved = optional(anchors, AnchorMotion, "anchors")
+    if moved is not None and isinstance(start, Robot) and pose is not None:
+        start = start.replace(frame_anchors=moved._of(start, 0.0))
     if isinstance(start, Plan) and (start.path is not None or start.state.pose.shape):
         if unstrained_length is not None:
             step = "Give plan.state[0] to simulate lengths that differ from the plan."
@@ -197,7 +221,19 @@ def initial_conditions(
     if wrench is not None:
         table = TimeTable.of(wrench, "wrench", "N or N m", 6, initial.begin)
     initial.lengths.check_lengths(initial.robot)
-    return replace(initial, wrench=table, end=end)
+    moved = initial.anchors if moved is None else moved
+    if moved is not None:
+        _check_anchors(initial.robot, moved, initial.begin, end)
+    return replace(initial, wrench=table, end=end, anchors=moved)
+
+
+def _check_anchors(robot: Robot, anchors: AnchorMotion, begin: float, end: float) -> None:
+    """Refuse anchors that are not known until the end, or begin elsewhere than those of the robot at the start."""
+    away = np.abs(anchors._of(robot, [begin, end])[0] - robot.frame_anchors).max()
+    if away > SAME_PLACE:
+        value, allowed = f"{away:.4g} m from those of the start, at {begin:g} s", "the same positions there"
+        step = "Plan with these anchors, or start with robot.replace(frame_anchors=anchors.at(0.0)) and a pose."
+        raise InvalidValueError("anchors", value, allowed, step)
 
 
 def _from_plan(plan: Plan) -> InitialConditions:
@@ -206,7 +242,7 @@ def _from_plan(plan: Plan) -> InitialConditions:
     if path is None or rate is None:
         step = "Plan along a Path, or give plan.state and a duration."
         raise InvalidValueError("start", "a plan of poses without times", "a plan along a path", step)
-    robot = plan.state.one_robot
+    robot = plan.robot
     lost = np.flatnonzero(~plan.feasible)
     if lost.size:
         k = int(lost[0])
@@ -233,6 +269,8 @@ def _from_plan(plan: Plan) -> InitialConditions:
         wrench=TimeTable.linear(path.time, given) if given.any() else TimeTable.constant(np.zeros(6)),
         begin=float(path.time[0]),
         end=float(path.time[-1]),
+        frames=robot.frame_anchors if plan.anchors is None else plan.anchors.at(path.time[some]),
+        anchors=plan.anchors,
     )
 
 
@@ -263,6 +301,8 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
         wrench=TimeTable.constant(state.wrench),
         begin=0.0,
         end=end,
+        frames=robot.frame_anchors,
+        anchors=None,
     )
 
 

@@ -95,16 +95,15 @@ class Plant:
         self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], inputs: Any
     ) -> Any:
         """First arguments of the kernel, without records and step counts. A break or a new mass changes them."""
-        lengths, wrenches, winds = inputs
-        wide = lengths.value.shape[1]
-        needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
+        given: tuple[TimeTable, ...] = inputs
+        wide = given[0].value.shape[1]
+        needed = 6 * 6 + 3 * body.STATE_COLUMNS + 10 * len(self.cables) + 2 * wide + 9
         if self._work.size != needed:
             self._work = np.zeros(needed)
         platform = locked(np.array([self.inertia[0], self.robot.gravity, 0.0, 0.0, 0.0]))
-        robot = (locked(self._table.view()), platform, locked(self.inertia.copy()), self.robot.freedom)
+        robot = (self._table, platform, locked(self.inertia.copy()), self.robot.freedom)
         kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._work)
         terms = (self.model.code, *self.model.parameters, self.robot.gravity, self._behind)
-        given: tuple[TimeTable, TimeTable, TimeTable] = (lengths, wrenches, winds)
         return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept
 
     def records(self, count: int) -> Records:

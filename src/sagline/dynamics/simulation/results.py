@@ -16,6 +16,7 @@ from sagline.core.results import Result, Saved
 from sagline.core.table import Columns, Tabular
 from sagline.dynamics.simulation.winches import Winches
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.motion.anchors import AnchorMotion
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -166,7 +167,9 @@ class EnergyBalance(Result):
         kinetic: Kinetic energy of platform, cables and drums.
         potential: Potential energy of the platform's weight, and of strain and height of the cables off the drums. The
             height of the platform counts from the origin, the heights of the cables from their frame ends.
-        supplied: Work done on the robot since the start by winches, external forces and wind.
+        supplied: Work done on the robot since the start by winches, external forces, wind and moving anchors. Anchors
+            that rise also lift the weight of their cables; this work is not included, because heights of cables count
+            from their frame ends.
         lost: Energy lost since the start, due to damping and friction, and due to averaging of strains on drums and
             creation and merging of chain nodes.
         removed: Energy of broken cables without mass and of dropped loads since the start, minus the energy of
@@ -236,6 +239,7 @@ class Simulation(Result, Saved, Tabular):
         damping: Energy losses of the cables.
         largest_tension: Largest frame-end tension of each cable at any step, including steps between samples [N], shape
             (m,); None if unknown.
+        anchors: Motion of the frame anchors; None for fixed anchors. The robot is then that at the first sample.
     """
 
     _columns: ClassVar[Columns] = ("time", "pose", "T#=tensions", "L#=length")
@@ -256,6 +260,7 @@ class Simulation(Result, Saved, Tabular):
     winding: str = "constant"
     damping: Damping = field(default_factory=Damping)
     largest_tension: Array | None = None
+    anchors: AnchorMotion | None = None
 
 
 def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:

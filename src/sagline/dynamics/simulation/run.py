@@ -19,7 +19,7 @@ from sagline.kernels.dynamics import rigid_body as body
 BLOCK: Final = 20_000  # steps per block, about 100 ms; interrupts are handled between blocks
 NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
 LIMITS: Final = {d.TORQUE: "torque", d.SPEED_BOUND: "speed", d.TORQUE + d.SPEED_BOUND: "torque and speed"}
-Inputs = tuple[TimeTable, TimeTable, TimeTable]
+Inputs = tuple[TimeTable, TimeTable, TimeTable, TimeTable]  # of lengths, wrenches, wind and anchors
 
 
 class SimulationRun:
@@ -127,7 +127,7 @@ class SimulationRun:
         self._occurrences.append(results.Occurrence(time, results.KINDS[type(event)], cable, peak, 0.0))
         start = plant.audit[d.START]
         self._apply(event, time)
-        plant.counters[[k.READY, k.LENGTH_AT, k.WRENCH_AT, k.WIND_AT]] = 0
+        plant.counters[[k.READY, k.LENGTH_AT, k.WRENCH_AT, k.WIND_AT, k.ANCHOR_AT]] = 0
         plant.now[d.PEAK] = 0.0
         self._arguments = plant.arguments(self._rules, self._numbers, self._inputs)
         left = before - _energy(self._record_now())
@@ -137,19 +137,21 @@ class SimulationRun:
         plant.audit[d.START] = start
 
     def _apply(self, event: results.Event, time: float) -> None:
-        plant, (lengths, wrenches, winds) = self.plant, self._inputs
+        plant, (lengths, wrenches, winds, anchors) = self.plant, self._inputs
         wide = lengths.value.shape[1] // len(plant.cables)
         if isinstance(event, results.Break):
             count, rows = len(plant.cables), plant.break_cable(event.cable, event.position)
             plant.broken.append(event.cable)
             columns = np.concatenate([rows + part * count for part in range(wide)])
-            self._inputs = (lengths.columns(columns), wrenches, winds)
+            if anchors.value.size:
+                anchors = anchors.columns((3 * rows[:, None] + np.arange(3)).ravel())
+            self._inputs = (lengths.columns(columns), wrenches, winds, anchors)
         elif isinstance(event, results.Stall):
             plant.lock_winches(plant.cables == event.winch)
         elif isinstance(event, results.Brake):
             chosen = np.ones(len(plant.cables), dtype=np.bool_) if event.winch is None else plant.cables == event.winch
             columns = np.flatnonzero(np.tile(chosen, wide))  # this also preserves the expected tensions of the motors
-            self._inputs = (lengths.with_stop(time, event.duration, columns), wrenches, winds)
+            self._inputs = (lengths.with_stop(time, event.duration, columns), wrenches, winds, anchors)
         elif isinstance(event, results.Drop):
             plant.with_mass(plant.inertia[0] - event.mass, at_rest=False)
         elif isinstance(event, results.PickUp):

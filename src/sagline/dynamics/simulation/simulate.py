@@ -23,6 +23,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import massless as k
 from sagline.kinematics.plan import Plan
+from sagline.motion.anchors import AnchorMotion
 from sagline.robot.equilibrium import Equilibrium, HasState
 from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
@@ -52,6 +53,7 @@ def simulate(
     wind: TableInTime | None = None,
     damping: Damping | None = None,
     record: float | None = None,
+    anchors: AnchorMotion | None = None,
 ) -> Simulation:
     """Simulate a robot. The platform is a free body on exact cables, and the winches change the cable lengths.
 
@@ -95,6 +97,9 @@ def simulate(
             platform as a wrench.
         damping: Energy losses of the cables; None: no losses.
         record: Interval of the records [s], rounded to whole steps; None: 0.01.
+        anchors: Motion of the frame anchors, also for a plan with fixed anchors. At the start, the anchors are at the
+            positions that `start` has; if `start` is a robot, it rests at the anchors' positions at 0 s. None: the
+            anchors of the plan. Not supported: cables with mass.
 
     Returns:
         Simulation. Its events include the times at which a cable became slack or a winch reached a limit.
@@ -123,7 +128,10 @@ def simulate(
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
     elements = whole_number(nodes, "nodes", FEWEST, MOST)
-    given = initial_conditions(start, unstrained_length, wrench, duration, pose)
+    given = initial_conditions(start, unstrained_length, wrench, duration, pose, anchors)
+    if given.anchors is not None and cable_mass != "none":
+        step_to = "Omit cable_mass; the weight of the cables remains."
+        raise InvalidValueError("cable_mass", f'"{cable_mass}"', '"none" with moving anchors', step_to)
     if cable_mass == "modal":
         others = {"events": events, "winches": winches != "ideal", "wind": wind is not None, "integrator": integrator}
         if refused := [name for name, asked in others.items() if asked]:
@@ -178,7 +186,8 @@ def started_run(
     check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
     settings = {"integrator": get_args(Integrator)[rules[0]], "winches": winches, "winding": winding, "damping": losses}
-    inputs = (_set_points(given, plant, rules[1]), given.wrench, air)
+    settings["anchors"] = given.anchors
+    inputs = (_set_points(given, plant, rules[1]), given.wrench, air, given.places)
     return SimulationRun(plant, rules, numbers, inputs, every, count, happening, settings)
 
 
@@ -224,7 +233,7 @@ def initial_plant(
         plant.remember_winding(spare * float(given.lengths.value.max()))
     size = _time_step(given, data, step, code, kind, losses, events, elements)
     stride = round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1
-    return plant, (code, kind, int(remembered), _load_bits(losses, given.wrench, with_wind), stride), size, losses
+    return plant, (code, kind, int(remembered), _load_bits(losses, given, with_wind), stride), size, losses
 
 
 def _checked_damping(damping: Damping | None) -> Damping:
@@ -255,7 +264,7 @@ def _time_step(
     """Check `step` [s] at the smallest platform mass. `elements`: number of elements of a cable with mass, else 0."""
     robot, lengths = given.robot, given.lengths.value
     waves = wave_frequency(given, elements) if elements else 0.0
-    highest = highest_frequency(robot, given.poses, lengths, kind, data, _lightness(robot.mass, events))
+    highest = highest_frequency(robot, given.poses, lengths, kind, data, _lightness(robot.mass, events), given.frames)
     # losses limit the step only for massless cables; for cables with mass, they are integrated implicitly
     return _checked_step(step, code, highest, Damping() if elements else losses, kind == d.DRUMS, waves)
 
@@ -269,11 +278,11 @@ def _lightness(mass: float, events: tuple[Event, ...]) -> float:
     return float(np.sqrt(mass / least))
 
 
-def _load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
-    """Bit mask for the kernel: one bit for each active damping or load."""
+def _load_bits(losses: Damping, given: InitialConditions, with_wind: bool) -> int:
+    """Bit mask for the kernel: one bit for each active damping or load, and for moving anchors."""
     damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
-    loaded = with_wind or bool(wrench.value.any())
-    return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * with_wind
+    loaded = with_wind or bool(given.wrench.value.any())
+    return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * with_wind + k.MOVED * (given.anchors is not None)
 
 
 def _every(record: Any, step: float) -> int:
@@ -301,14 +310,22 @@ LONGEST: Final = 1e-3  # s
 
 
 def highest_frequency(
-    robot: Robot, poses: Pose, lengths: Array, kind: int, data: Array, lightness: float = 1.0
+    robot: Robot,
+    poses: Pose,
+    lengths: Array,
+    kind: int,
+    data: Array,
+    lightness: float = 1.0,
+    frames: Array | None = None,
 ) -> float:
     """Highest angular frequency of platform and winches as a coupled system [rad/s].
 
-    `lightness`: factor of the platform frequency for a smaller mass.
+    `lightness`: factor of the platform frequency for a smaller mass. `frames`: frame anchors at the poses; None for
+    those of the robot.
     """
     # shapes: lengths (K, m) [m]; data (DATA_ROWS, m)
-    platform = _platform_frequency(robot, poses, lengths) * lightness
+    frames = robot.frame_anchors if frames is None else frames
+    platform = _platform_frequency(robot, poses, lengths, frames) * lightness
     if kind == d.SECOND_ORDER:
         return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
     if kind == d.DRUMS:  # the largest eigenvalue is at most the sum of those with one mass only
@@ -317,13 +334,13 @@ def highest_frequency(
     return platform
 
 
-def _platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
+def _platform_frequency(robot: Robot, poses: Pose, lengths: Array, frames: Array) -> float:
     """Highest angular frequency of the platform with all cables taut [rad/s]. Sag reduces this frequency."""
     # shapes: lengths (K, m) [m]
     rotation, freedom = poses.matrix, robot.freedom
     levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
     ends = (poses.position + rotation @ robot.center_of_mass)[:, None] + levers
-    chords = ends - robot.frame_anchors
+    chords = ends - frames
     distance = np.linalg.norm(chords, axis=-1, keepdims=True)
     along = chords / np.maximum(distance, 1e-300)
     rows = np.concatenate((along, np.cross(levers, along)), axis=-1) @ freedom.T

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import brief, instance, integer, whole_number
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.simulation.initial_conditions import InitialConditions, TimeTable, initial_conditions
+from sagline.dynamics.simulation.initial_conditions import FIXED, InitialConditions, TimeTable, initial_conditions
 from sagline.dynamics.simulation.plant import Records, energy_error
 from sagline.dynamics.simulation.simulate import Integrator, initial_plant
 from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding
@@ -127,7 +127,7 @@ class Simulator:
         lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
         rules = (code, kind, remembered, loads | LOADED, stride)
         numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
-        inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)))
+        inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)), FIXED)
         records = (*Records(0, m).arrays[:-1], np.empty((0, k.NOTE_COLUMNS)))
         self._settings, self._records = (rules, numbers, inputs), records
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])

@@ -233,6 +233,6 @@ def fastest_rates(robot: Robot, length: Array) -> Array:
 def _speed_excess(plan: Plan) -> float:
     """Largest ratio of a winch speed in `plan` to its limit, at least 1."""
     assert plan.length_rate is not None
-    limits = fastest_rates(plan.state.one_robot, plan.unstrained_length)
+    limits = fastest_rates(plan.robot, plan.unstrained_length)
     ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))
     return ratio * (1.0 + _SLOWER) if ratio > 1.0 else 1.0

@@ -78,7 +78,7 @@ def chain_run_of(
     wind, memory = vector(memory, 3)
     targets, memory = vector(memory, width)
     target_rates, memory = vector(memory, width)
-    lengths, wrenches, winds = progress.time_tables(courses)
+    lengths, wrenches, winds, _anchors = progress.time_tables(courses)
     drives = d.Drives(kind, remembered > 0, data, now, layers, audit)
     return ChainRun(
         _Chains(*chain_arrays), step, gravity, body[0], body[1], body[2], body[3], drives, lengths, wrenches, winds,

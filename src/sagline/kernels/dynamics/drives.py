@@ -87,7 +87,9 @@ HELD, SATURATED, SLACK = 11, 12, 13  # NO or YES; SATURATED contains the limits;
 STORED = 14  # strain of the cable that enters or leaves the drum
 BEFORE, BEFORE_WHOLE, BEFORE_DRUM = 15, 16, 17  # L, H and tension at the drum one step before
 PULL = 18  # frame-end tension without damping [N]; cables without mass only
-DRIVE_ROWS = 19
+ANCHOR_X, ANCHOR_Y, ANCHOR_Z = 19, 20, 21  # velocity of the frame anchor [m/s]; cables without mass only
+ANCHOR_LOSS = 22  # power of the anchor due to damping [W]
+DRIVE_ROWS = 23
 
 # rows of the parameters of the drives, (DATA_ROWS, m)
 INERTIA = 0  # inertia of motor, gear and drum at the cable [kg]

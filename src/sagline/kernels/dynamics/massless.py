@@ -22,7 +22,7 @@ from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import components_along, fill_motion_of_components
 
 SPLITTING, RUNGE_KUTTA = 0, 1
-DAMPED, LOADED, BLOWN = 1, 2, 4  # one bit for each kind of damping or load that is active
+DAMPED, LOADED, BLOWN, MOVED = 1, 2, 4, 8  # one bit for each kind of damping, load, or motion of anchors
 
 Losses = tuple[float, float]
 # code, k_h, k_p, gravity; True for pulleys or dead lengths, else None
@@ -48,6 +48,7 @@ class MasslessRun(NamedTuple):
     lengths: progress.CubicTable
     wrenches: progress.CubicTable
     winds: progress.CubicTable
+    anchors: progress.CubicTable
     state: Array
     rows: Array
     at: Indices
@@ -64,6 +65,8 @@ class MasslessRun(NamedTuple):
     first: Array
     total: Array
     lengths_base: Array
+    places: Array  # positions of moving anchors, (3 m,)
+    speeds: Array  # velocities of the anchors, (3 m,)
 
 
 @glue
@@ -81,12 +84,13 @@ def massless_run_of(
     wide, memory = block(memory, 4, rows.shape[1])
     both, memory = block(memory, 2, courses[0][1].shape[1])
     rotation, memory = block(memory, 3, 3)
-    lengths, wrenches, winds = progress.time_tables(courses)
+    anchored, memory = block(memory, 2, 3 * rows.shape[1])
+    lengths, wrenches, winds, anchors = progress.time_tables(courses)
     drives = Drives(kind, remembered > 0, data, now, layers, audit)
     return MasslessRun(
         Model(*model), work, step, (loss_time, air), cables, body, inertia, freedom, drives, lengths, wrenches, winds,
-        state, rows, at, rotation, small[0], small[1], small[2], small[3], small[4], small[5], both[0], both[1],
-        sides[0], sides[1], sides[2], wide,
+        anchors, state, rows, at, rotation, small[0], small[1], small[2], small[3], small[4], small[5], both[0],
+        both[1], sides[0], sides[1], sides[2], wide, anchored[0], anchored[1],
     )  # fmt: skip
 
 
@@ -167,8 +171,8 @@ def damp_cables(
     damping of the air is computed as if the cable moved like its chord.
 
     losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
-    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives; the damping parts of
-        its tensions are filled; wrench: filled.
+    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives with the velocities of
+    the anchors; the damping parts of its tensions, and the power of the anchors, are filled; wrench: filled.
     """
     lost = 0.0
     wrench[:] = 0.0
@@ -177,6 +181,7 @@ def damp_cables(
     for i in range(cables.shape[0]):
         rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
         ux, uy, uz = vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx
+        ax, ay, az = now[d.ANCHOR_X, i], now[d.ANCHOR_Y, i], now[d.ANCHOR_Z, i]
         x, y = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i], rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
         z, chord, length = rows[g.SINE, i], rows[g.CHORD, i], rows[g.LENGTH, i]
         stiffness, tension = cables[i, tables.STIFFNESS], rows[g.TENSION, i]
@@ -185,14 +190,42 @@ def damp_cables(
         if tension > 0.0:
             share = 1.0 / (1.0 + stiffness * weight * weight * chord / (12.0 * length * tension * tension * tension))
         strained = chord / rows[g.LENGTH if behind is None else g.FREE_LENGTH, i]
-        rate = ux * x + uy * y + uz * z - now[d.RATE, i] * strained
+        away = ax * x + ay * y + az * z
+        rate = ux * x + uy * y + uz * z - away - now[d.RATE, i] * strained
         more = max(losses[0] * stiffness / length * share * share * rate, -tension)
         slow = losses[1] * chord / 3.0
         now[d.STRETCHING, i] = more * strained
         now[d.AT_FRAME, i] = max(now[d.PULL, i] + more, 0.0)
-        lost += more * rate + slow * (ux * ux + uy * uy + uz * uz)
-        _add_at_end(rows, i, -more * x - slow * ux, -more * y - slow * uy, -more * z - slow * uz, wrench)
+        # along the chord, the velocity changes linearly from the anchor to the platform end
+        both, anchor = ux * ax + uy * ay + uz * az, ax * ax + ay * ay + az * az
+        lost += more * rate + slow * (ux * ux + uy * uy + uz * uz + both + anchor)
+        now[d.ANCHOR_LOSS, i] = slow * (anchor + 0.5 * both) - more * away
+        fx, fy, fz = slow * (ux + 0.5 * ax), slow * (uy + 0.5 * ay), slow * (uz + 0.5 * az)
+        _add_at_end(rows, i, -more * x - fx, -more * y - fy, -more * z - fz, wrench)
     return lost
+
+
+@kernel
+def move_anchors(run: MasslessRun, now: float) -> None:
+    """Move the anchors to their positions at the time `now`, and fill their velocities."""
+    at = run.at
+    at[progress.ANCHOR_AT] = progress.interpolate_table(
+        run.anchors, at[progress.ANCHOR_AT], now, 0.0, run.places, run.speeds
+    )
+    for i in range(run.cables.shape[0]):
+        for k in range(3):
+            run.cables[i, tables.FRAME_X + k] = run.places[3 * i + k]
+            run.drives.now[d.ANCHOR_X + k, i] = run.speeds[3 * i + k]
+
+
+@kernel
+def power_of_anchors(rows: Array, now: Array) -> float:
+    """Power of moving anchors on the cables [W], without that of lifting the cables with their anchors."""
+    power = 0.0
+    for i in range(rows.shape[1]):
+        level = rows[g.AZIMUTH_X, i] * now[d.ANCHOR_X, i] + rows[g.AZIMUTH_Y, i] * now[d.ANCHOR_Y, i]
+        power += now[d.ANCHOR_LOSS, i] - rows[g.HORIZONTAL, i] * level - rows[g.VERTICAL, i] * now[d.ANCHOR_Z, i]
+    return power
 
 
 @kernel
@@ -210,6 +243,8 @@ def fill_forces(run: MasslessRun, now: float) -> None:
     """Fill platform force (minus the energy gradient), given wrench, and cable tensions at the time `now`."""
     at, drives, rows, state = run.at, run.drives, run.rows, run.state
     fill_set_points(run, now, -progress.MOMENT * run.step)
+    if run.work & MOVED:
+        move_anchors(run, now)
     if run.work & LOADED:
         at[progress.WRENCH_AT] = progress.interpolate_table(
             run.wrenches, at[progress.WRENCH_AT], now, 0.0, run.given, run.spare
@@ -232,7 +267,7 @@ def fill_forces(run: MasslessRun, now: float) -> None:
 
 @kernel
 def fill_damping(run: MasslessRun) -> None:
-    """Fill the damping wrench at the present velocities, and the powers of damping and given forces."""
+    """Fill the damping wrench at the present velocities, and the powers of damping, given forces and anchors."""
     if run.work:
         spinning = spin(run.state, run.inertia)
         drives, motion = run.drives, run.spare
@@ -244,6 +279,8 @@ def fill_damping(run: MasslessRun) -> None:
             )
             project_on_freedom(run.freedom, run.damping, motion)
         drives.audit[d.GIVEN_POWER] = power_of(run.given, run.state, spinning)
+        if run.work & MOVED:
+            drives.audit[d.GIVEN_POWER] += power_of_anchors(run.rows, drives.now)
 
 
 @glue

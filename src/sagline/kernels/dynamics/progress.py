@@ -61,19 +61,20 @@ def interval_ends(course: CubicTable, at: int, moment: float) -> bool:
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]
 
 
-Courses = tuple[CubicTableArrays, CubicTableArrays, CubicTableArrays]  # of lengths, wrenches, and wind velocity
+# of lengths, wrenches, wind velocity, and positions of moving anchors (without columns for fixed anchors)
+Courses = tuple[CubicTableArrays, CubicTableArrays, CubicTableArrays, CubicTableArrays]
 Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives, layers, audit, counters
 
 
 @glue
-def time_tables(courses: Courses) -> tuple[CubicTable, CubicTable, CubicTable]:
-    """Time tables of lengths, wrenches and wind velocity."""
-    return CubicTable(*courses[0]), CubicTable(*courses[1]), CubicTable(*courses[2])
+def time_tables(courses: Courses) -> tuple[CubicTable, CubicTable, CubicTable, CubicTable]:
+    """Time tables of lengths, wrenches, wind velocity and anchors."""
+    return CubicTable(*courses[0]), CubicTable(*courses[1]), CubicTable(*courses[2]), CubicTable(*courses[3])
 
 
 # counters of a run, which each call updates; RENEWED: 1 for new set points, 2 if the wrench has changed too
-STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED = range(9)
-COUNTERS = 9
+STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED, ANCHOR_AT = range(10)
+COUNTERS = 10
 # columns of the notes: event, time and cable; largest tensions before and after the event; state of the cable or drive
 NOTE_TIME, NOTE_KIND, NOTE_CABLE, NOTE_BEFORE, NOTE_AFTER, NOTE_STATE = range(6)
 NOTE_COLUMNS = 6
