@@ -85,7 +85,7 @@ SINGLE: Final = {
     "tension.other_methods.DEPENDENT": 1e-5,
     "tension.polygon.FLAT": 1e-6,
 }
-OMITTED: Final = {"tables.SWIVELS": False}  # code that no exported source needs
+OMITTED: Final = {"tables.SWIVELS": False, "tables.MOVES": False}  # code that no exported source needs
 ENTRIES: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (
     ("inverse_poses", "inverse_nearest", (*INVERSE, NONE, NONE, *ANSWERS)),
     ("inverse_poses", "inverse_by_method", (*INVERSE, s.BOOL, NONE, *ANSWERS)),

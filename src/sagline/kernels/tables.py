@@ -17,6 +17,7 @@ PULLEY_RADIUS = 10  # R [m]
 ENTRY = 11  # s: +1 if the cable enters the pulley from below, -1 if from above
 DEAD_CABLE, DEAD_RISE = 12, 13  # length from drum to pulley, height of the pulley's entry above the drum [m]
 CABLE_COLUMNS = 14
+MOVES = True  # False in exported C sources, whose frame anchors are fixed
 SWIVELS = True  # False in exported C sources, which are for vertical swivel axes only
 # A table with these columns as well has swivel axes of any direction: unit vector along the cable where it enters the
 # pulley. ENTRY is then NaN for an axis that is not vertical.

@@ -243,7 +243,7 @@ def fill_forces(run: MasslessRun, now: float) -> None:
     """Fill platform force (minus the energy gradient), given wrench, and cable tensions at the time `now`."""
     at, drives, rows, state = run.at, run.drives, run.rows, run.state
     fill_set_points(run, now, -progress.MOMENT * run.step)
-    if run.work & MOVED:
+    if tables.MOVES and (run.work & MOVED) > 0:
         move_anchors(run, now)
     if run.work & LOADED:
         at[progress.WRENCH_AT] = progress.interpolate_table(
@@ -279,7 +279,7 @@ def fill_damping(run: MasslessRun) -> None:
             )
             project_on_freedom(run.freedom, run.damping, motion)
         drives.audit[d.GIVEN_POWER] = power_of(run.given, run.state, spinning)
-        if run.work & MOVED:
+        if tables.MOVES and (run.work & MOVED) > 0:
             drives.audit[d.GIVEN_POWER] += power_of_anchors(run.rows, drives.now)
 
 
