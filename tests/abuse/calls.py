@@ -966,12 +966,18 @@ def _programs(folder: Path) -> dict[str, Call]:
 
 def _logs(given: _Given) -> dict[str, Call]:
     lengths, cells = np.array([[3.0, 2.0], [3.5, 2.5], [4.0, 2.25]]), np.array([[50.0, 60.0], [np.nan, 61.0], [52, 62]])
-    sensors = sl.Sensors(tension_deviation=5.0, position_deviation=1e-3, rotation_deviation=1e-3)
+    sensors = sl.Sensors(
+        *(5e-4, 5.0, 1e-3, 1e-3),
+        swivel_deviation=1e-3,
+        frequency_deviation=0.02,
+    )
     quaternion = np.tile([0.0, 0.6, 0.0, 0.8], (3, 1))
     fields: dict[str, tuple[Any, ...]] = {
         "load_cells": ("array", np.nan_to_num(cells), True),
         "position": ("array", np.ones((3, 3)), True),
         "rotation": ("array", quaternion, True),
+        "swivel": ("array", lengths, True),
+        "frequency": ("array", np.sort(lengths, axis=1), True),
         "time": ("array", [0.0, 1.0, 2.5], True),
         "commanded": ("one", given.poses, True),
         "sensors": ("one", sensors),
