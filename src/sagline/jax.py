@@ -7,7 +7,7 @@ implicit function theorem; docs/howto/jax.md. A pose without a solution has NaN 
 from __future__ import annotations
 
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias
+from typing import Any, Final, NamedTuple, Protocol, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -32,9 +32,6 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF, check_sharing
 from sagline.tension.methods import DEFAULT
-
-if TYPE_CHECKING:
-    pass
 
 Value: TypeAlias = Any  # an array of JAX or NumPy, or a tracer
 TARGET: Final = "sagline"

@@ -78,7 +78,7 @@ def test_a_log_with_swivel_angles_is_found(cells: bool, tmp_path: Path) -> None:
     errors = np.array([found.value_of(f"swivel_zero[{k}]")[1] for k in range(4)])
     assert (np.abs(off) < 2.5 * errors).all()
     assert {one.quantity: one.stated for one in found.sensor_deviations()}["swivel angle"] == DEVIATION
-    assert "the world turned about the vertical" in [way.name for way in found.gauge]
+    assert any("vertical" in way.name for way in found.gauge)
     found.save(tmp_path / "found.nc")
     again = sl.load_calibration(tmp_path / "found.nc")
     np.testing.assert_array_equal(again.residuals, found.residuals)
