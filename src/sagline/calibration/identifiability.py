@@ -13,8 +13,9 @@ import numpy as np
 
 from sagline.calibration.findings import Direction
 from sagline.calibration.further import swivel_senses
+from sagline.calibration.least_squares import left_jacobian
 from sagline.calibration.log import Sensors
-from sagline.calibration.parameters import Parameters, PriorUnits, left_jacobian, prior_units
+from sagline.calibration.parameters import Parameters, PriorUnits, prior_units
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds

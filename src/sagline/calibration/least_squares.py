@@ -16,7 +16,6 @@ from scipy.special import chdtri
 
 from sagline.calibration.log import Sensors, count_of_frequencies, reading_deviations
 from sagline.calibration.observations import BLOCK, NO_LOAD, MachineTerms, WhitenedRows, whitened_rows
-from sagline.calibration.parameters import left_jacobian
 from sagline.calibration.problem import Evaluated, Fit, FitProblem, Normal, SearchState
 from sagline.calibration.straight import fit_poses, move_poses, straight_rows
 from sagline.core.arrays import Array, Flags, Indices, locked
@@ -292,3 +291,18 @@ def _significant_eigenpairs(matrix: Array) -> tuple[Array, Array]:
 def exceeded_with(probability: Any, freedoms: Any) -> Array:
     """Value that chi squared exceeds with the (small) probability `probability`, for at least one degree of freedom."""
     return np.asarray(chdtri(np.maximum(freedoms, 1), probability))
+
+
+_SMALL = 1e-4  # [rad]; for smaller angles, the first terms of the power series are sufficient
+
+
+def left_jacobian(vector: Array) -> Array:
+    """Matrix J with exp(v + dv) = exp(J dv) exp(v) for the rotation vector v = `vector` [rad], shape (3,)."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < _SMALL:
+        first, second = 0.5, 1.0 / 6.0
+    else:
+        first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) + first * cross + second * cross @ cross)

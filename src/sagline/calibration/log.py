@@ -389,10 +389,9 @@ def _check_sensors(log: WinchLog, cables: int) -> None:
         ("swivel_deviation", log.swivel, cables),
         ("frequency_deviation", log.frequency, 0 if log.frequency is None else log.frequency.shape[1]),
     )
-    names = {"tension_deviation": "load_cells"}
     for name, read, size in pairs:
         deviation = getattr(log.sensors, name)
-        item, read_name = f"sensors: {name}", names.get(name, name.removesuffix("_deviation"))
+        item, read_name = f"sensors: {name}", name.removesuffix("_deviation").replace("tension", "load_cells")
         if read is not None and deviation is None:
             step = f"Give sensors=Sensors({name}=...), or leave {read_name} out."
             raise InvalidValueError(item, "None", f"the standard deviation of {read_name}", step)

@@ -364,21 +364,6 @@ def values_in(parameters: Parameters, values: Array, row: int, otherwise: float)
     return np.where(where >= 0, values[where], otherwise)
 
 
-_SMALL = 1e-4  # [rad]; for smaller angles, the first terms of the power series are sufficient
-
-
-def left_jacobian(vector: Array) -> Array:
-    """Matrix J with exp(v + dv) = exp(J dv) exp(v) for the rotation vector v = `vector` [rad], shape (3,)."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < _SMALL:
-        first, second = 0.5, 1.0 / 6.0
-    else:
-        first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
-    return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
-
-
 _FIXED: Final = 5e-2  # a parameter is known if its stated deviation is less than this share of the usual deviation
 _WIDE: Final = 1e3  # largest used prior deviation, in multiples of the usual deviation of an unknown value
 

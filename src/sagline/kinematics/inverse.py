@@ -157,16 +157,8 @@ def inverse(
         pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(placed, pose)
-    whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
-
-    def equilibrium() -> Equilibrium:
-        cables, contact = cables_of_results(robots, model, found.results, found.cable_status, pose.shape)
-        return with_routing(Equilibrium(placed, pose, whole, cables, contact), direction)
-
-    state = equilibrium()
-    if found.reject_slack(state.unstrained_length):
-        state = equilibrium()
+    state = _state_of(robots, placed, model, pose, load, found, direction)
     if stability:
         inverse_rows.decide_stability(placed, (model.code, *model.parameters), rows, found)
     plan = _plan_of(state, path, tension, found, anchors)
@@ -185,6 +177,26 @@ def _load_of(robots: Robot | tuple[Robot, ...], pose: Pose, path: Path | None, w
     """External wrench, plus the inertial wrench of a path, shape (6,) or (N, 6)."""
     load = external_wrench(wrench, len(pose) if pose.shape else None)
     return load if path is None else locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
+
+
+def _state_of(
+    robots: Robot | tuple[Robot, ...],
+    placed: Robot | tuple[Robot, ...],
+    model: CableModel,
+    pose: Pose,
+    load: Array,
+    found: inverse_rows.InverseRows,
+    direction: Array | None,
+) -> Equilibrium:
+    """Equilibria of the rows `found`, without lengths that are too slack. `placed`: robots with moved anchors."""
+    whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
+
+    def equilibrium() -> Equilibrium:
+        cables, contact = cables_of_results(robots, model, found.results, found.cable_status, pose.shape)
+        return with_routing(Equilibrium(placed, pose, whole, cables, contact), direction)
+
+    state = equilibrium()
+    return equilibrium() if found.reject_slack(state.unstrained_length) else state
 
 
 def _anchors_along(anchors: AnchorMotion, robots: Robot | tuple[Robot, ...], motion: Path | Pose) -> Array:
