@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 import sagline.jax as sj
 from sagline.core.arrays import Array
+from sagline.jax import calls
 from tests.refusal import refused
 from tests.statics.test_sensitivities import planar
 from tests.statics.test_stiffness import richardson
@@ -239,8 +240,8 @@ def test_single_precision_and_other_back_ends_are_refused(monkeypatch: pytest.Mo
             sj.inverse(COGIRO, POSE)
     finally:
         jax.config.update("jax_enable_x64", True)
-    sj._register.cache_clear()
-    monkeypatch.setattr(sj, "backend", lambda: "python")
+    calls.register.cache_clear()
+    monkeypatch.setattr(calls, "backend", lambda: "python")
     with refused("SAGLINE_BACKEND", "python", "c for sagline.jax"):
         sj.inverse(COGIRO, POSE)
 
@@ -252,4 +253,4 @@ def test_a_call_that_does_not_fit_an_entry_is_an_error_of_jax() -> None:
         (("least_stiffnesses", np.ones((6, 6)), np.ones((1, 6, 6))), "no such entry"),
     ):
         with pytest.raises(jax.errors.JaxRuntimeError, match=reason):
-            jax.block_until_ready(sj._call(*arguments, sj._result(1)))
+            jax.block_until_ready(calls.call_kernel(*arguments, calls.result_of(1)))

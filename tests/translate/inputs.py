@@ -158,7 +158,7 @@ def corner_cases() -> None:
 
 def lengths_by_inputs(state: sl.Equilibrium) -> Array:
     """Sensitivities of the lengths of one pose, which only XLA calls in the package, (m, 7 m + 6)."""
-    kernels: Any = vars(sagline.jax)["distribution"]  # as the recorder sees it
+    kernels: Any = vars(sagline.jax.functions)["distribution"]  # as the recorder sees it
     m, limits = state.cables.shape[-1], LIMITS_OF[state.one_robot.tension_limits_of]
     found = np.empty((1, m, kernels.LENGTH_COLUMNS * m + 6))
     (terms, robots, poses, results, memory, states) = next(KernelStates.of(state).parts())

@@ -6,7 +6,7 @@ implicit function theorem; docs/howto/jax.md. A pose without a solution has NaN 
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import Any, Final, NamedTuple, Protocol, TypeAlias
 
 import jax
@@ -18,11 +18,11 @@ from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import instance
 from sagline.core.errors import InvalidValueError
+from sagline.jax.calls import Work, call_kernel, register, result_of
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.forward import distribution
 from sagline.kernels.forward.sensitivity import BY_LENGTH, DATA
-from sagline.kernels.jit import VARIABLE, backend, compiled_library
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.status import STABLE
@@ -34,9 +34,7 @@ from sagline.tension.method import LIMITS_OF, check_sharing
 from sagline.tension.methods import DEFAULT
 
 Value: TypeAlias = Any  # an array of JAX or NumPy, or a tracer
-TARGET: Final = "sagline"
 _CATENARY: Final = Catenary()
-LETTERS: Final = {"float64": "D", "int64": "L", "int8": "B"}
 
 
 class HasPose(Protocol):
@@ -185,13 +183,6 @@ def inverse(
     return Inverse(*_inverse(machine, row, _wrench(wrench), *anchors, goal))
 
 
-class _Work(NamedTuple):
-    """Work array of a kernel."""
-
-    shape: tuple[int, ...]
-    dtype: Any
-
-
 class _Machine:
     """Tables of a robot, and calls of the kernels with them."""
 
@@ -200,7 +191,7 @@ class _Machine:
         if not jax.config.read("jax_enable_x64"):
             step = 'Call jax.config.update("jax_enable_x64", True) at the beginning of the program.'
             raise InvalidValueError("jax_enable_x64", False, "True, because poses need double precision", step)
-        _register()
+        register()
         own = model_of(model)
         if own.code == codes.STRAIGHT:
             step = "Use Catenary() or Elastic()."
@@ -215,7 +206,7 @@ class _Machine:
         self.limits = LIMITS_OF[robot.tension_limits_of], float("nan")
         self.weight = 0.0 if own.weightless else robot.cables.linear_density * robot.gravity
         self.rows = result_rows(robot)
-        self.memory = tuple(_Work(array.shape, array.dtype) for array in memory_for(robot.cable_count))
+        self.memory = tuple(Work(array.shape, array.dtype) for array in memory_for(robot.cable_count))
 
     def anchors(self, frame: Value | None, platform: Value | None) -> tuple[Value, Value]:
         """Frame anchors and platform anchors, (m, 3) each."""
@@ -234,7 +225,7 @@ class _Machine:
         """Results of `describe_states` for one pose."""
         m = self.cables
         shapes = (6, 6), (m, 3, 3), (DATA, m, 3), (m, 3), (m, 3), (m, 7)
-        return tuple(_result(1, *shape) for shape in shapes)
+        return tuple(result_of(1, *shape) for shape in shapes)
 
     def frame_end_tension(self, results: Value) -> Value:
         """Tensions at the frame ends (m,) of `results` (rows, 1, m)."""
@@ -250,12 +241,12 @@ def _equilibrium(
     """Pose (1, POSE_COLUMNS) and results (rows, 1, m) of the forward kinematics; NaN without a stable equilibrium."""
     m, n = machine.cables, machine.free
     given = *machine.robots(frame, platform), lengths[None], start[None], wrench[None]
-    works = [_Work(shape, np.float64) for shape in ((CABLE_ROWS, m), (n, n), (tables.LAST_COLUMNS,))]
+    works = [Work(shape, np.float64) for shape in ((CABLE_ROWS, m), (n, n), (tables.LAST_COLUMNS,))]
     outputs = (
-        *(_result(1, tables.POSE_COLUMNS), _result(machine.rows, 1, m), _result(1, m, dtype=np.int8)),
-        *(_result(1, tables.FORWARD_NUMBERS), _result(1, dtype=np.int8)),
+        *(result_of(1, tables.POSE_COLUMNS), result_of(machine.rows, 1, m), result_of(1, m, dtype=np.int8)),
+        *(result_of(1, tables.FORWARD_NUMBERS), result_of(1, dtype=np.int8)),
     )
-    pose, results, _, _, status = _call(
+    pose, results, _, _, status = call_kernel(
         "forward_poses", machine.terms, False, given, tuple(works), machine.memory, outputs
     )
     stable = (status[0] == np.array(STABLE)).any()
@@ -276,9 +267,9 @@ def _forward_jvp(machine: _Machine, primals: Any, tangents: Any) -> tuple[Any, A
     lengths, wrench, frames, platforms, _ = tangents
     pose, results = _equilibrium(machine, *primals)
     shapes = (6, 6), (DATA, 6, m), (6, 3 * m), (6, 3 * m), (m, m), (m, max(m - n, 0))
-    found = _call(
+    found = call_kernel(
         *("sensitivities_of_states", machine.terms, machine.robots(frame, platform), pose, results),
-        *(machine.memory, machine.states(), tuple(_result(1, *shape) for shape in shapes)),
+        *(machine.memory, machine.states(), tuple(result_of(1, *shape) for shape in shapes)),
     )
     slopes, compliance, by_data, by_frame, by_platform = found[5][0], *(array[0] for array in found[6:10])
     turn = _matrix(pose[0, 3:])
@@ -310,12 +301,12 @@ def _plan(machine: _Machine, row: Value, wrench: Value, frame: Value, platform: 
     """Results (rows, 1, m) of the inverse kinematics; NaN if the pose is infeasible."""
     m, n = machine.cables, machine.free
     method = codes.QUADRATIC_PROGRAM, 0.0, codes.CHORD_TENSION, jnp.ones(m), goal
-    results, *_ = _call(
+    results, *_ = call_kernel(
         *("inverse_poses", machine.model, method, machine.limits, machine.robots(frame, platform), row[None]),
-        *(wrench[None], _Work((m,), np.float64), machine.memory, None, False),
+        *(wrench[None], Work((m,), np.float64), machine.memory, None, False),
         (
-            *(_result(machine.rows, 1, m), _result(1, m, dtype=np.int8), _result(1, 2), _result(1, n)),
-            _result(1, dtype=np.int8),
+            *(result_of(machine.rows, 1, m), result_of(1, m, dtype=np.int8), result_of(1, 2), result_of(1, n)),
+            result_of(1, dtype=np.int8),
         ),
         *(0, 1),
     )
@@ -334,9 +325,9 @@ def _inverse_jvp(machine: _Machine, primals: Any, tangents: Any) -> tuple[Any, A
     m = machine.cables
     row, _, frame, platform, goal = primals
     results = _plan(machine, *primals)
-    found = _call(
+    found = call_kernel(
         *("sensitivities_of_lengths", machine.terms, machine.limits, machine.robots(frame, platform), row[None]),
-        *(results, goal[None], machine.memory, machine.states(), _result(1, m, distribution.LENGTH_COLUMNS * m + 6)),
+        *(results, goal[None], machine.memory, machine.states(), result_of(1, m, distribution.LENGTH_COLUMNS * m + 6)),
     )
     levers, slopes, by_inputs = found[3][0], found[5][0], found[6][0]
     change, wrench, frames, platforms, goals = tangents
@@ -361,57 +352,6 @@ def _inverse_jvp(machine: _Machine, primals: Any, tangents: Any) -> tuple[Any, A
 
 
 _inverse.defjvp(_inverse_jvp, symbolic_zeros=True)
-
-
-@cache
-def _register() -> None:
-    """Make the compiled kernels known to JAX. Refuse other back ends."""
-    if backend() != "c":
-        step = "Build the library of compiled kernels with `make env`, or install a wheel."
-        raise InvalidValueError(VARIABLE, backend(), "c for sagline.jax", step)
-    jax.ffi.register_ffi_target(TARGET, jax.ffi.pycapsule(compiled_library().xla), platform="cpu")
-
-
-def _call(entry: str, *arguments: Any) -> list[Value]:
-    """Results of a kernel. Its arguments are numbers, None, arrays, work arrays and results, in tuples."""
-    operands: list[Value] = []
-    results: list[Any] = []
-    numbers: list[float] = []
-    sizes: list[int] = []
-    plan: list[str] = []
-
-    def form(value: Any) -> str:
-        """Format of an argument, as the library declares it."""
-        if isinstance(value, tuple) and not isinstance(value, _Work):
-            return f"({''.join(map(form, value))})"
-        if value is None:
-            return "N"
-        if isinstance(value, bool | int | float):
-            numbers.append(float(value))
-            return "?" if isinstance(value, bool) else "i" if isinstance(value, int) else "f"
-        if isinstance(value, _Work):
-            sizes.extend(value.shape)
-        else:
-            (results if isinstance(value, jax.ShapeDtypeStruct) else operands).append(value)
-        plan.append("s" if isinstance(value, _Work) else "r" if isinstance(value, jax.ShapeDtypeStruct) else "a")
-        return f"{LETTERS[np.dtype(value.dtype).name]}{len(value.shape)}"
-
-    text = form(arguments)
-    call = jax.ffi.ffi_call(TARGET, results, vmap_method="expand_dims")
-    found: list[Value] = call(
-        *operands,
-        entry=entry,
-        format=text,
-        plan="".join(plan),
-        sizes=np.array(sizes, dtype=np.int64),
-        numbers=np.array(numbers, dtype=np.float64),
-    )
-    return found
-
-
-def _result(*shape: int, dtype: Any = np.float64) -> Any:
-    """Result of a kernel."""
-    return jax.ShapeDtypeStruct(shape, dtype)
 
 
 def _shaped(value: Value, name: str, shape: tuple[int, ...]) -> Value:
