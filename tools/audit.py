@@ -23,6 +23,7 @@ PERMITTED: Final = (
     *("python software foundation", "zlib"),
 )
 EXCEPTIONS: Final = {  # each with its reason
+    "fmpy": "its text of the license is that of BSD-2-Clause",
     "graphemeu": "its text of the license is that of MIT",
     "moocore": "LGPL, a library that pymoo loads in its own process space; sagline does not distribute it",
 }

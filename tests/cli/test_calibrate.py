@@ -152,7 +152,7 @@ def test_the_help_names_the_default_unknowns() -> None:
     assert signature(sl.calibrate).parameters["unknowns"].default is None
     names = set(sl.calibration_poses(sl.load_robot("cogiro"), 3, candidates=30).parameters.names)
     words = set(re.findall(r"[a-z]+(?:_[a-z]+)+|mass", parameters["unknowns"].help))
-    assert words == names
+    assert words - {"swivel_zero"} == names  # this one needs swivel angles
 
 
 def test_other_names_of_columns_and_further_unknowns(run: Run, files: Path) -> None:

@@ -269,7 +269,7 @@ def test_a_reading_controller_sends_nothing_and_estimates_the_pose() -> None:
 
 def test_homing_proposes_a_jog_until_tensions_agree() -> None:
     # the part that no motion of the platform reduces
-    tight = -6e-3 * sl.stiffness(sl.inverse(prototype(), HOME).state).null_lengths[:, 0]
+    tight = -6e-3 * np.linalg.svd(sl.stiffness(sl.inverse(prototype(), HOME).state).length_sensitivity)[2][6]
     control, _ = rig(with_zero_errors(prototype(), tight), home=False)
     control.connect()
     with refused("homing", kind=RefusedError) as caught:

@@ -11,7 +11,7 @@ from sagline.robot.tolerances import UNCERTAIN, Provenance, value_of
 from tests.refusal import refused
 
 # kinds of unknowns that are not fields of a robot
-OUTSIDE = {"measuring_frame", "length_scale", "clock_offset", "target"}
+OUTSIDE = {"inertia", "measuring_frame", "length_scale", "clock_offset", "swivel_zero", "target"}
 
 
 def four(**changes: Any) -> Robot:

@@ -266,10 +266,10 @@ def test_marks_of_a_moved_robot_agree_with_a_new_one(name: str, monkeypatch: pyt
     """From the second pose on solvers answer, which know no guides; another robot has none at first."""
     robot, moved, calls, here = changed(name), MethodMarks(), list[sl.Pose](), threading.get_ident()
 
-    def counted(*arguments: Any) -> sl.Plan:
+    def counted(*arguments: Any, **settings: Any) -> sl.Plan:
         if threading.get_ident() == here:  # not the thread of a page that is served
             calls.append(arguments[1])
-        return sl.inverse(*arguments)
+        return sl.inverse(*arguments, **settings)
 
     monkeypatch.setattr("sagline.viewer.snapshot.inverse", counted)
     home, load = home_pose(robot), np.array([30.0, -20.0, -50.0, 4.0, 2.0, -1.0])
