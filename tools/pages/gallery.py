@@ -35,6 +35,8 @@ SHOWN: Final = {  # command -> line of marks.py; of the viewer its pictures
     "convert": "printed by: sagline convert robot.wcrfx",
     "export-c": "printed by: sagline export-c cogiro",
     "export-scl": "printed by: sagline export-scl article-prototype",
+    "export-fmu": "printed by: sagline export-fmu cogiro",
+    "export-linuxcnc": "printed by: sagline export-linuxcnc cogiro",
     "share": "shared by: sagline simulate cogiro --break 3@0.5s --no-figures --out break.nc && sagline share break.nc",
     "twin": "printed during a run: twin",
     "control": "printed during a run: control",

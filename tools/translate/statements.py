@@ -155,7 +155,10 @@ class Statements(Calls):
         type_ = self.types[name] = self.joined(node, self.types.get(name), value.type, f"the variable {name}")
         if type_ == NONE:
             return
-        text = f"{identifier(name)} = {self.converted(value, type_, node)};"
+        given = self.converted(value, type_, node)
+        if given == identifier(name):  # a part of a tuple that keeps its value
+            return
+        text = f"{identifier(name)} = {given};"
         self.written += value.writes
         if name not in self.declared:
             self.declared.add(name)

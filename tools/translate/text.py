@@ -49,6 +49,7 @@ _HEAD: Final = """\
 
 /* the passes of the next loop have no effect on each other */
 #if defined __clang__
+#pragma clang diagnostic ignored "-Wpass-failed" /* some loops cannot be vectorized */
 #define SL_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
 #elif defined __GNUC__
 #define SL_INDEPENDENT _Pragma("GCC ivdep")

@@ -265,7 +265,7 @@ BASES: list[str] | None = option(
     None,
     "FILE=CABLES",
     "Base that moves, such as a ship or a drone: its poses in .csv or .yaml, and the cables whose anchors it carries: "
-    "ship.csv=0,1,2,3. Poses are relative to the place in the robot file. The option can be repeated.",
+    "ship.yaml=0,1,2,3. Poses are relative to the place in the robot file. The option can be repeated.",
     "--base",
 )
 LOSS_TIME: float | None = quantity(

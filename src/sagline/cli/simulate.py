@@ -89,7 +89,7 @@ def simulate(
 
         sagline simulate article-suspended own_path.yaml --shaper zvd
         sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
-        sagline simulate cogiro own_path.yaml --base ship.csv=0,1,2,3 --winches robot
+        sagline simulate cogiro own_path.yaml --base ship.yaml=0,1,2,3
     """
     from sagline.dynamics.simulation.initial_conditions import initial_conditions
     from sagline.dynamics.simulation.simulate import NODES, losses_after_break

@@ -55,7 +55,7 @@ def track(
         sagline track article-suspended
         sagline track own_robot.yaml own_path.yaml --model empirical --out results
         sagline track cogiro own_samples.csv --payload 20 --csv
-        sagline track cogiro own_path.yaml --base ship.csv=0,1,2,3
+        sagline track cogiro own_path.yaml --base ship.yaml=0,1,2,3
     """
     machine = opt.robot_with_payload(robot, payload)
     way = sl.article_path() if path is None else load_path_near(machine, path)
@@ -97,7 +97,7 @@ def anchors_of(robot: sl.Robot, bases: Sequence[str] | None) -> sl.AnchorMotion 
         file, _, cables = text.rpartition("=")
         numbers = cables.split(",")
         if not file or not all(re.fullmatch(r"[0-9]{1,4}", number.strip()) for number in numbers):
-            step = "Give the file and the cables: --base ship.csv=0,1,2,3."
+            step = "Give the file and the cables: --base ship.yaml=0,1,2,3."
             raise sl.InvalidValueError("--base", repr(text), "FILE=CABLES", step)
         found.append((sl.load_path(file), [int(number) for number in numbers]))
     return sl.anchors_on_bases(robot, found) if found else None

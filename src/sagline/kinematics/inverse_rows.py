@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arguments import brief, choice
+from sagline.core.arguments import brief, choice, elements
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
@@ -205,10 +205,12 @@ def given_codes(robot: Robot, given: Sequence[Given] | None) -> Indices | None:
         allowed = f"{fewer}>= {robot.degrees_of_freedom} for {robot.motion_pattern}"
         step = f"Add cables; or, in Python, name {m} given values for inverse, such as given=('x', 'z')."
         raise InvalidValueError(f"{robot.name}: number of cables", m, allowed, step)
-    names = _DEFAULT[:m] if given is None else tuple(choice(name, "given", CODES) for name in given)
+    several, step = f"{m} names of given values", "Give as many values as the robot has cables."
+    named = _DEFAULT[:m] if given is None else elements(given, str, "given", step, several)
+    names = tuple(choice(name, "given", CODES) for name in named)
     if len(names) != m or len(set(names)) != m or m < 2:
         allowed = f"{m} different names of {', '.join(CODES)} for {m} cables" if m > 1 else "at least 2 cables"
-        raise InvalidValueError("given", ", ".join(names), allowed, "Give as many values as the robot has cables.")
+        raise InvalidValueError("given", ", ".join(names), allowed, step)
     return locked(np.array([CODES[name] for name in names], dtype=np.int64))
 
 
