@@ -138,3 +138,18 @@ def test_invalid_options_of_an_episode_are_refused() -> None:
         env.reset(options={"begin": [0.0, 0.0, 2.0]})
     with refused("pose"):
         env.reset(options={"start": [0.0, 0.0, 50.0]})
+
+
+def test_events_of_an_iterator_happen_in_every_episode() -> None:
+    env: Any = gymnasium.make(ID, events=iter([sl.Break(2, 0.0)]))
+    for _ in range(2):
+        env.reset(seed=1)
+        observation, *_ = env.step(np.zeros(8))
+        assert observation[14] < 1e-6  # tension of cable 2
+
+
+def test_a_step_before_the_first_reset_is_refused() -> None:
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        environment.CableRobotVectorEnv(2).step(np.zeros((2, 8)))
+    with refused("seed", "3 numbers", "2 numbers, or one"):
+        environment.CableRobotVectorEnv(2).reset(seed=[1, 2, 3])

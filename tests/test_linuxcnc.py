@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import configparser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,6 +86,12 @@ def test_infeasible_poses_and_bad_numbers_keep_the_joints(module: Module) -> Non
     world = World(x=1.0, y=2.0, z=3.0)
     assert module.forward(np.full(8, 2.0), world)[0] == -1
     assert (world.x, world.y, world.z) == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(("unit", "text"), [("mm", "mm"), ("inch", "inch"), ("m", "0.001")])
+def test_the_unit_in_the_settings_is_a_word_or_a_number_per_millimeter(tmp_path: Path, unit: Any, text: str) -> None:
+    _, settings = sl.export_linuxcnc(sl.load_robot("cogiro"), tmp_path, unit=unit)
+    assert f"LINEAR_UNITS = {text}\n" in settings.read_text()
 
 
 def test_settings_have_the_lengths_at_home(module: Module) -> None:

@@ -67,7 +67,7 @@ class _Episodes:
         self._moves: Actions = choice(action, "action", get_args(Actions))
         self._speed, self._period = number(speed, "speed", "m/s", above=0.0), number(period, "period", "s", above=0.0)
         self._last = whole_number(episode_steps, "episode_steps", 1)
-        self._events = events
+        self._events = events if callable(events) else self._supported(events)
         self._options: dict[str, Any] = {"winches": winches, "damping": damping, "step": step}
         self._places = self._feasible_places()
         m, limit = self.robot.cable_count, OVERLOAD * self.robot.tension_max
@@ -108,13 +108,16 @@ class _Episodes:
     def _events_of(self, rng: np.random.Generator, options: Mapping[str, Any]) -> list[Event]:
         """Events of an episode in reverse order."""
         given = options.get("events", self._events)
-        end = self._last * self._period
-        events = checked_events(given(rng) if callable(given) else given, self.robot, 0.0, end, pieces=False)
-        for k, event in enumerate(events):
+        return list(reversed(self._supported(given(rng) if callable(given) else given)))
+
+    def _supported(self, events: Event | Iterable[Event]) -> tuple[Event, ...]:
+        """Checked events in their order."""
+        found = checked_events(events, self.robot, 0.0, self._last * self._period, pieces=False)
+        for k, event in enumerate(found):
             if not isinstance(event, Break | Stall | Drop | PickUp):
                 step = "Omit it: the actions control the winches."
                 raise InvalidValueError(f"events[{k}]", type(event).__name__, "Break, Stall, Drop or PickUp", step)
-        return list(reversed(events))
+        return found
 
     def begin(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> None:
         """Begin an episode in row `i`."""
@@ -201,8 +204,19 @@ class CableRobotEnv(gymnasium.Env[Array, Array]):
 
     Reward per step: 1 - distance from the target / diagonal of the box - 0.2 x angle from the target [rad].
 
-    `reset(options=...)` accepts "start" and "target" (poses) and "events". `info["distance"]` is the distance from the
-    target [m].
+    Actions outside -1 to 1 are clipped, and lengths stay above the dead lengths. An event happens at the begin of
+    the first period at or after its time. `reset(options=...)` accepts "start" and "target" (poses) and "events".
+    `info["distance"]` is the distance from the target [m].
+
+    Examples:
+        >>> import gymnasium
+        >>> import sagline as sl
+        >>> import sagline.gymnasium
+        >>> env = gymnasium.make("sagline/CableRobot-v0", robot="cogiro", events=sl.Break(2, 0.5))
+        >>> observation, info = env.reset(seed=1)
+        >>> observation, reward, terminated, truncated, info = env.step([0.0] * 8)
+        >>> print(observation.shape, terminated)
+        (28,) False
     """
 
     def __init__(self, robot: Robot | str = "cogiro", **settings: Any) -> None:
@@ -218,15 +232,6 @@ class CableRobotEnv(gymnasium.Env[Array, Array]):
         Raises:
             FileError: If there is no such preset.
             InvalidValueError: If the robot has no test box or no feasible positions in it, or a setting is invalid.
-
-        Examples:
-            >>> import gymnasium
-            >>> import sagline as sl
-            >>> import sagline.gymnasium
-            >>> env = gymnasium.make("sagline/CableRobot-v0", robot="cogiro", events=sl.Break(2, 0.5))
-            >>> observation, info = env.reset(seed=1)
-            >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
-            >>> print(f"{info['distance']:.1f} m")
         """
         self._episodes = _Episodes(1, robot, **settings)
         self.observation_space, self.action_space = self._episodes.observations, self._episodes.actions
@@ -262,7 +267,7 @@ class CableRobotVectorEnv(VectorEnv[Array, Array, Any]):
         self.observation_space, self.action_space = (
             batch_space(space, self.num_envs) for space in (self._episodes.observations, self._episodes.actions)
         )
-        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+        self._ended: Flags | None = None
         self._random = [np_random()[0] for _ in range(self.num_envs)]
 
     def reset(
@@ -271,16 +276,21 @@ class CableRobotVectorEnv(VectorEnv[Array, Array, Any]):
         """Begin an episode of each environment."""
         if isinstance(seed, int | np.integer):
             seed = [int(seed) + i for i in range(self.num_envs)]
+        if seed is not None and len(seed) != self.num_envs:
+            step = "Give one seed per environment, or a single one."
+            raise InvalidValueError("seed", f"{len(seed)} numbers", f"{self.num_envs} numbers, or one", step)
         for i, given in enumerate(seed or ()):
             if given is not None:
                 self._random[i] = np_random(given)[0]
         for i in range(self.num_envs):
             self._episodes.begin(i, self._random[i], options or {})
-        self._ended[:] = False
+        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
         return self._episodes.observe(), self._episodes.info()
 
     def step(self, actions: Array) -> tuple[Array, Array, Flags, Flags, dict[str, Any]]:
         """Simulate one period of all environments; see the class."""
+        if self._ended is None:
+            raise gymnasium.error.ResetNeeded("The environments have no episodes yet. Call reset() first.")
         for i in np.flatnonzero(self._ended).tolist():
             self._episodes.begin(i, self._random[i], {})
         reward, ended, truncated = self._episodes.advance(np.asarray(actions), ~self._ended)

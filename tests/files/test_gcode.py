@@ -107,6 +107,15 @@ def test_programs_for_printers_have_their_own_conventions(tmp_path: Path) -> Non
     assert load(tmp_path, text, dialect="marlin").duration == path.duration
 
 
+@pytest.mark.parametrize("dwells", ["G4 P1.5\n", "G4 P1\nG28\nG4 P0.5\n"])
+def test_a_dwell_before_the_first_motion_does_not_fix_the_position(tmp_path: Path, dwells: str) -> None:
+    path = load(tmp_path, f"{dwells}G0 X10 Y20 Z5\nG1 X30 F600\n")
+    np.testing.assert_allclose(path.pose.position[0], (0.01, 0.02, 0.005), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(np.ptp(path.pose.position, axis=0), (0.02, 0.0, 0.0), rtol=0.0, atol=1e-12)
+    waits = path.time[np.abs(path.twist[:, :3]).max(axis=1) == 0.0]
+    assert waits[waits < path.time[-1]].max() == pytest.approx(1.5, abs=0.02)
+
+
 def test_the_start_of_the_path(tmp_path: Path) -> None:
     text = "G0 X100\nG0 Y100 Z100\n"
     assert load(tmp_path, text).pose.position[0].tolist() == [0.1, 0.0, 0.0]

@@ -46,6 +46,15 @@ def random_corners(seed: int, count: int) -> Array:
     return np.vstack((np.zeros(3), np.cumsum(steps, axis=0)))
 
 
+def test_a_fine_polygon_is_as_slow_as_its_circle(tmp_path: Path) -> None:
+    """720 lines on a circle of 10 mm: each turn is passed without a stop, and v^2 = a R bounds the speed."""
+    angle = np.linspace(0.0, 2.0 * pi, 721)
+    points = 0.01 * np.stack((np.cos(angle) - 1.0, np.sin(angle), 0.0 * angle), axis=1)
+    path = load(tmp_path, program(points[1:], 0.5), acceleration=1.0)
+    speed = np.linalg.norm(path.twist[:, :3], axis=1)
+    assert speed.max() == pytest.approx(sqrt(1.0 * 0.01), rel=0.01)
+
+
 @pytest.mark.parametrize("seed", wide(range(12), 2))
 def test_rounded_corners_keep_the_tolerance_and_the_acceleration(tmp_path: Path, seed: int) -> None:
     corners = random_corners(seed, 40)

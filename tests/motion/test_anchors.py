@@ -137,3 +137,16 @@ def test_bad_motions_are_refused(name: str) -> None:
 def test_level_bases_carry_pulleys() -> None:
     anchors = sl.anchors_on_bases(with_pulleys(), [(base(roll=0.0), range(8))])
     assert np.ptp(anchors.position[:, 0, 0]) > 3.0
+
+
+def test_times_of_bases_that_differ_by_rounding_count_as_one() -> None:
+    robot, time = sl.load_robot("cogiro"), np.linspace(0.0, 10.0, 101)
+    place = np.outer(np.sin(0.6 * time), [0.3, 0.0, 0.2])
+    bases = [
+        (sl.path_from_samples(each, sl.Pose(place)), cables)
+        for each, cables in ((time, range(4)), (time.round(9), range(4, 8)))
+    ]
+    anchors = sl.anchors_on_bases(robot, bases)
+    assert np.diff(anchors.time).min() > 0.09
+    exact = 0.6 * np.cos(0.6 * time)[:, None] * [0.3, 0.0, 0.2]
+    np.testing.assert_allclose(anchors.velocity(time), np.repeat(exact[:, None], 8, axis=1), rtol=0.0, atol=1e-5)

@@ -65,7 +65,8 @@ def load_gcode(
     **Speed.** The platform moves at the feed. It slows down where the acceleration requires this: the accelerations
     along the path and toward the center of an arc are at most `acceleration` each.
 
-    **Corners.** A change of direction up to 0.01 rad is passed without a stop. At any other corner the platform stops.
+    **Corners.** A change of direction up to 0.01 rad is passed without a stop, as an arc over half of the shorter line
+    would be. At any other corner the platform stops.
     With `tolerance` > 0, or after G64 P, a corner of two lines is rounded by an arc instead, at most this distance from
     the corner; the arc takes at most half of each line. G61 ends this, and G61.1 stops after every motion.
 

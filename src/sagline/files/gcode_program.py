@@ -18,6 +18,7 @@ from sagline.motion.contour import EXACT_STOP, LEAST, Moves
 Dialect = Literal["linuxcnc", "marlin"]
 
 BATCH: Final = 8192  # number of moves per block
+_DWELL: Final = Row._fields.index("dwell")
 OFFSETS: Final = ("G54", "G55", "G56", "G57", "G58", "G59")
 _LINE: Final = re.compile(r"[^\n]*\n?")
 _COMMENT: Final = re.compile(r"\([^()]*\)|;.*")
@@ -89,6 +90,7 @@ class _Program:
         self.tolerance = settings.tolerance
         self.homed = 0  # line of the last G28, G29 or G30
         self.begun = self.moved = False
+        self.waiting = 0.0  # dwells before the position is known [s]
         self.rows = array("d")
 
     def refuse(self, reason: str) -> NoReturn:
@@ -222,7 +224,9 @@ class _Program:
             self._dwell(words)
         elif action in (28, 29, 30):
             self.homed = self.line if self.moved else 0
-            self.position = self.position if self.moved else self.settings.start
+            if not self.moved:  # the rows contain dwells only
+                self.waiting += sum(self.rows[_DWELL :: len(Row._fields)])
+                self.position, self.rows = self.settings.start, array("d")
         elif action == 92:
             given = [axis for axis, letter in enumerate("XYZ") if letter in words]
             if not given and "E" not in words:
@@ -246,9 +250,16 @@ class _Program:
         time = words[given] * (1e-3 if printer and given == "P" else 1.0)
         if not 0.0 <= time <= FARTHEST:
             self.refuse(f"the time of G4 is {time:g} s; allowed: 0 to {FARTHEST:g} s")
-        if time > 0.0:
-            position = self._known()
-            self._append(Row(*position, 0.0, 0.0, 0.0, 0, 0.0, 0.0, EXACT_STOP, time, self.line))
+        self.waiting += time
+        if self.position is not None:
+            self._wait()
+
+    def _wait(self) -> None:
+        """Append the dwells that wait for a known position."""
+        if self.waiting > 0.0:
+            row = Row(*self._known(), 0.0, 0.0, 0.0, 0, 0.0, 0.0, EXACT_STOP, self.waiting, self.line)
+            self.waiting = 0.0
+            self._append(row)
 
     def _known(self) -> Point:
         """The current position [m]; the origin of the work coordinates before the first motion."""
@@ -298,7 +309,9 @@ class _Program:
         target, begins = self._target(words, of_machine)
         if begins:
             self.position = self.block_start = target
+            self._wait()
             return
+        self._wait()
         length = dist(self._known(), target)
         speed = self._speed(motion, length)
         self._append(Row(*target, 0.0, 0.0, 0.0, 0, 0.0, speed, self.tolerance, 0.0, self.line), length)
@@ -324,6 +337,7 @@ class _Program:
         if "IJK"[n] in words:
             self.refuse(f"{'IJK'[n]} beside {name} with G{self.plane}; allowed: {'IJK'[a]} and {'IJK'[b]}, or R")
         start = self._known()
+        self._wait()
         target, _ = self._target(words, False)
         by_radius = "R" in words
         if by_radius == any("IJK"[axis] in words for axis in (a, b)):

@@ -122,7 +122,8 @@ def forward(
     """
     machine = _Machine(robot, model, "forward", slanted=True)
     anchors = machine.anchors(frame_anchors, platform_anchors)
-    row = jax.lax.stop_gradient(jnp.concatenate((_vector(start.position, 3), _vector(start.quaternion, 4))))
+    turn = _vector(start.quaternion, 4)
+    row = jax.lax.stop_gradient(jnp.concatenate((_vector(start.position, 3), turn / jnp.linalg.norm(turn))))
     lengths = _shaped(unstrained_length, "unstrained_length", (machine.cables,))
     pose, tension = _forward(machine, lengths, _wrench(wrench), *anchors, row)
     return Forward(pose[:3], pose[3:], tension)

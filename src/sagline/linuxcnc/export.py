@@ -51,7 +51,7 @@ def export_linuxcnc(
         folder: Folder of the files, created if it is missing; existing files are replaced.
         name: Name of the module: lower-case letters, digits and underscores.
         unit: Unit of lengths of the machine, LINEAR_UNITS in its INI file: "mm", "inch" or "m".
-        tension: Tension distribution method.
+        tension: Tension distribution method. `Closest` gives the tensions of least norm, as for a single pose.
         home: Pose whose lengths become the home positions in NAME.ini. None: the middle of the test box of the robot,
             or of its frame.
 
@@ -108,7 +108,7 @@ def _settings(state: Equilibrium, name: str, unit: Unit) -> str:
         f"JOINTS = {robot.cable_count}",
         "[TRAJ]",
         f"COORDINATES = {'X Y Z A B C' if turns else 'X Y Z'}",
-        f"LINEAR_UNITS = {unit}",
+        f"LINEAR_UNITS = {'0.001' if unit == 'm' else unit}",  # a number: units of the machine per millimeter
         "ANGULAR_UNITS = degree",
         f"# HOME: unstrained length at X Y Z = {' '.join(f'{each:.3f}' for each in position)}",
     ]

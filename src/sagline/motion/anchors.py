@@ -171,6 +171,7 @@ def anchors_on_bases(robot: Robot, bases: Iterable[tuple[Path, Iterable[int]]]) 
     begin, end = max(one.time[0] for one in motions), min(one.time[-1] for one in motions)
     time = np.unique(np.concatenate([one.time for one in motions]))
     time = time[(time >= begin) & (time <= end)]
+    time = time[np.diff(time, prepend=-np.inf) > _SAME * (end - begin)]  # times of two bases that differ by rounding
     if time.size < 2:
         value = f"of one base until {end:g} s, of another from {begin:g} s"
         step = "Give paths of the bases with common times."

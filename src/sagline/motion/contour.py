@@ -70,6 +70,7 @@ class _Joined(Moves):
     """Moves and arcs in rounded corners."""
 
     passed: Flags  # True if the end is passed without a stop, shape (M,)
+    turn: Array  # change of direction at an end that is passed without an arc [rad], shape (M,)
 
 
 class Samples(NamedTuple):
@@ -130,11 +131,11 @@ def _joined(blocks: Iterable[Moves]) -> Iterator[_Joined]:
         else:
             held = chain
     if held is not None and len(held):
-        yield _with_flags(held, np.zeros(1, dtype=np.bool_))
+        yield _with_turns(held, np.zeros(1, dtype=np.bool_), np.zeros(1))
 
 
-def _with_flags(moves: Moves, passed: Flags) -> _Joined:
-    return _Joined(**{each.name: getattr(moves, each.name) for each in fields(moves)}, passed=passed)
+def _with_turns(moves: Moves, passed: Flags, turn: Array) -> _Joined:
+    return _Joined(**{each.name: getattr(moves, each.name) for each in fields(moves)}, passed=passed, turn=turn)
 
 
 def _rounded(chain: Moves) -> tuple[_Joined, Moves]:
@@ -171,7 +172,8 @@ def _rounded(chain: Moves) -> tuple[_Joined, Moves]:
     )
     passed = bent | (moving & (angle <= SMOOTH))
     order = np.arange(2 * len(first)).reshape(2, -1).T.ravel()  # each move, then its corner
-    both = _with_flags(chain[:-1].and_then(arcs), np.concatenate((passed, passed)))[order]
+    turn = np.concatenate((np.where(passed & ~bent, angle, 0.0), np.zeros(len(first))))
+    both = _with_turns(chain[:-1].and_then(arcs), np.concatenate((passed, passed)), turn)[order]
     return both[(both.length > LEAST) | (both.dwell > 0.0)], chain[-1:]
 
 
@@ -206,8 +208,12 @@ def _limit(moves: Moves, acceleration: float) -> Array:
 
 def _squares(chain: _Joined, acceleration: float, entry: float, end: float) -> Array:
     """Squares of the largest speeds (M + 1,) at the ends of the moves, which the acceleration allows to reach."""
-    limit = _limit(chain, acceleration)
-    bounds = np.append(np.append(entry, np.where(chain.passed[:-1], np.minimum(limit[:-1], limit[1:]), 0.0)), end)
+    limit, turn = _limit(chain, acceleration), chain.turn[:-1]
+    # a turn between short lines counts as an arc that takes half of each line
+    arc = acceleration * np.minimum(chain.length[:-1], chain.length[1:])
+    smooth = np.divide(arc, turn, out=np.full(len(turn), np.inf), where=turn > 0.0)
+    inner = np.where(chain.passed[:-1], np.minimum(np.minimum(limit[:-1], limit[1:]), smooth), 0.0)
+    bounds = np.append(np.append(entry, inner), end)
     gain = np.append(0.0, np.cumsum(2.0 * acceleration * chain.length))
     down = np.minimum.accumulate((bounds + gain)[::-1])[::-1] - gain
     down[0] = entry

@@ -58,8 +58,8 @@ def attach(
             and inertia are those of the body.
         body: Name of the body that the cables hold.
         prefix: Prefix of all new names, for models with several robots.
-        unstrained_length: Lengths off the drum at the start [m], shape (m,). None: the lengths that hold the robot at
-            the initial pose of the body.
+        unstrained_length: Lengths off the drum at the start [m], shape (m,). None: lengths that hold the robot, with
+            its own mass and center of mass, at the initial pose of the body. Another body moves to its equilibrium.
         damping: Energy losses of the cables, as for `simulate`. None: no losses.
 
     Raises:
@@ -74,7 +74,7 @@ def attach(
         >>> spec = mujoco.MjSpec()
         >>> load = spec.worldbody.add_body(name="load", pos=(0.0, 0.0, 2.0))
         >>> joint = load.add_freejoint()
-        >>> box = load.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.5] * 3)
+        >>> box = load.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.5] * 3, mass=91.058)
         >>> sl.mujoco.attach(spec, sl.load_robot("cogiro"), body="load")
         >>> model = spec.compile()
         >>> model.nu, model.nsensordata

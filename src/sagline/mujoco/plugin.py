@@ -83,7 +83,8 @@ def load_plugin() -> None:
 def library() -> Path:
     """The library in the cache of this user, compiled if it is missing."""
     source = _source()
-    place = base_folder().parent / "mujoco" / sha256(f"{_engine()} {source}".encode()).hexdigest()[:16]
+    key = sha256(f"{_engine()} {mujoco_module().__version__} {source}".encode()).hexdigest()
+    place = base_folder().parent / "mujoco" / key[:16]
     return place / LIBRARY if (place / LIBRARY).is_file() else _built(place, source)
 
 
