@@ -120,7 +120,7 @@ def off_by(name: str, winch: sl.Winch, *, zeroed: bool = False) -> tuple[float, 
 def test_the_error_of_the_straight_formula_is_that_on_the_page() -> None:
     without = [off_by(name, PULLEYS) for name in ROBOTS]
     assert is_stated("angle", f"{max(angle for _, angle in without):.1f}°")
-    assert is_stated(f"at most {max(error for error, _ in without):.1f} µm from its exact position")
+    assert is_stated(f"most {max(error for error, _ in without):.1f} µm", "exact position")
     rising = {name: off_by(name, RISING)[0] for name in ROBOTS}
     soft = rising.pop("article-prototype")
     assert is_stated(f"{1e-3 * soft:.2f} mm on the prototype", f"most {1e-3 * max(rising.values()):.2f} mm")

@@ -15,7 +15,7 @@ from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.trajectories.fastest import fastest_rates
-from sagline.kinematics.length_rates import lengths_near
+from sagline.kinematics.plan import lengths_near
 from sagline.robot.batch import refuse_slanted
 from sagline.robot.drum import drum_lever, drum_tension
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
