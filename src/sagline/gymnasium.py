@@ -140,8 +140,11 @@ class _Episodes:
         self._position[i], self._turn[i], self._twist[i] = reading.position, reading.quaternion, reading.twist
         self._tension[i] = reading.tension
 
-    def advance(self, action: Array, running: Flags) -> tuple[Array, Flags, Flags]:
-        """Simulate one period of the episodes `running` (N,). Returns rewards, terminations and truncations, (N,)."""
+    def advance(self, action: Array, running: Flags) -> tuple[Array, Array, Flags, Flags]:
+        """Simulate one period of the episodes `running` (N,).
+
+        Returns observations, and rewards, terminations and truncations (N,).
+        """
         most, asked = self._speed * self._period, np.clip(action, -1.0, 1.0)
         if self._moves == "length":
             asked = np.clip((self._start + self._reach * asked - self._length) / most, -1.0, 1.0)
@@ -153,21 +156,18 @@ class _Episodes:
             self._machines[i].step(self._length[i], self._period)
             self._read(i)
         self._steps += running
-        away, turn = self._errors()
-        lost = np.linalg.norm(away, axis=1) / self._size + TURN_COST * np.linalg.norm(turn, axis=1)
+        seen = self.observe()
+        away, turn = (np.linalg.norm(seen[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
         outside = (np.abs(self._position - self._middle) > self._half).any(axis=1)
         ended = running & (outside | (self._tension > self._largest).any(axis=1))
-        return np.where(running, 1.0 - lost, 0.0), ended, running & ~ended & (self._steps >= self._last)
-
-    def _errors(self) -> tuple[Array, Array]:
-        """Position minus target [m], and rotation vector from the target's rotation [rad], both (N, 3)."""
-        turn = Rotation.from_quat(self._turn) * Rotation.from_quat(self._target_turn).inv()
-        return self._position - self._target, turn.as_rotvec()
+        reward = np.where(running, 1.0 - (away / self._size + TURN_COST * turn), 0.0)
+        return seen, reward, ended, running & ~ended & (self._steps >= self._last)
 
     def observe(self) -> Array:
         """Observations, (N, 12 + 2 m)."""
-        wound = (self._length - self._start) / self._reach
-        return np.concatenate((*self._errors(), self._twist, self._tension / self._weight, wound), axis=1)
+        away, wound = self._position - self._target, (self._length - self._start) / self._reach
+        turn = (Rotation.from_quat(self._turn) * Rotation.from_quat(self._target_turn).inv()).as_rotvec()
+        return np.concatenate((away, turn, self._twist, self._tension / self._weight, wound), axis=1)
 
     def info(self) -> dict[str, Array]:
         """Distances from the target [m], (N,)."""
@@ -244,8 +244,8 @@ class CableRobotEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Simulate one period; see the class."""
-        reward, ended, truncated = self._episodes.advance(np.asarray(action)[None], np.ones(1, dtype=np.bool_))
-        return self._episodes.observe()[0], float(reward[0]), bool(ended[0]), bool(truncated[0]), self._info()
+        seen, reward, ended, truncated = self._episodes.advance(np.asarray(action)[None], np.ones(1, dtype=np.bool_))
+        return seen[0], float(reward[0]), bool(ended[0]), bool(truncated[0]), self._info()
 
     def _info(self) -> dict[str, Any]:
         return {name: float(values[0]) for name, values in self._episodes.info().items()}
@@ -293,9 +293,9 @@ class CableRobotVectorEnv(VectorEnv[Array, Array, Any]):
             raise gymnasium.error.ResetNeeded("The environments have no episodes yet. Call reset() first.")
         for i in np.flatnonzero(self._ended).tolist():
             self._episodes.begin(i, self._random[i], {})
-        reward, ended, truncated = self._episodes.advance(np.asarray(actions), ~self._ended)
+        seen, reward, ended, truncated = self._episodes.advance(np.asarray(actions), ~self._ended)
         self._ended = ended | truncated
-        return self._episodes.observe(), reward, ended, truncated, self._episodes.info()
+        return seen, reward, ended, truncated, self._episodes.info()
 
 
 if ID not in gymnasium.registry:
