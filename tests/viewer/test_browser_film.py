@@ -105,7 +105,6 @@ MATRIX = [
 def test_a_film_shows_the_run_with_clock_and_legend(
     browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch, name: str, width: int
 ) -> None:
-    monkeypatch.setattr(export, "RATE", 0.5)
     run = a_run(name)
     with opened(browser, run.robot, run, width=width) as (page, viewer):
         page.get_by_text("Export").click()
@@ -116,6 +115,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
         page.locator("#sagline-film").wait_for(state="detached")
         (client,) = viewer.server.get_clients().values()
         await_that(page, lambda: not client.scene._handle_from_node_name)
+        monkeypatch.setattr(export, "RATE", 0.5)  # two pictures, which end before a test could cancel them
         with page.expect_download(timeout=1e3 * PATIENCE) as download:
             film_button.click()
         assert download.value.suggested_filename == f"{name}-run.mp4"
