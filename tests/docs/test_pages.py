@@ -44,6 +44,19 @@ def test_the_navigation_has_every_page_and_the_reference_every_public_name() -> 
     assert named == public
 
 
+def outside_code(text: str) -> str:
+    """A page without its code blocks."""
+    return re.sub(r"^ *```.*?^ *```", "", text, flags=re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "docs").rglob("*.md")), ids=lambda file: file.stem)
+def test_headings_and_tables_stand_between_blank_lines(file: Path) -> None:
+    lines = ["", *outside_code(file.read_text(encoding="utf-8")).splitlines(), ""]
+    kinds = [line[0] if re.match(r"#+ |\|", line) else line.strip() and "text" for line in lines]
+    meetings = {"#|", "|#", "##", "#text", "text#", "text|", "|text"}
+    assert [line for line, *pair in zip(lines[1:], kinds, kinds[1:], strict=False) if "".join(pair) in meetings] == []
+
+
 def measured(span: "float", *, rise: "float | None" = None) -> "Cable":  # type: ignore[name-defined]  # noqa: F821
     """Length of a cable.
 
