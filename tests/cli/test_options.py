@@ -21,7 +21,7 @@ import sagline as sl
 import sagline.cli
 from sagline.cli import values
 from sagline.cli.main import FORMER, MODULES, NAMES, app
-from sagline.cli.options import TensionVariable, expanded, tension_named
+from sagline.cli.options import expanded, tension_named
 from sagline.core.arguments import word_of
 from sagline.core.surface import public_names
 from tests.files.executions import execution
@@ -257,7 +257,7 @@ def test_every_tension_method_is_an_option() -> None:
         for command in OPTIONS[option].values():
             listed = command.help.removesuffix(".").partition(": ")[2].split(", ")
             assert {*listed} == names - {word_of(kind.__name__), "quadratic-program"}
-    assert type(tension_named("p-norm", TensionVariable.HORIZONTAL)) is sl.tension.PNorm
+    assert type(tension_named("p-norm", "horizontal")) is sl.tension.PNorm
 
 
 @pytest.mark.parametrize("words", [("track", "cogiro"), ("export-c", "cogiro")])

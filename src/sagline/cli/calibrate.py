@@ -69,7 +69,7 @@ class _Options:
     plot: Path | None = opt.option(None, "FILE", "Figure of the fit: .png, .svg or .pdf.", WITHOUT_PLAN)
     plan: int | None = opt.option(None, "NUMBER", "Without LOG: choose this number of poses to measure.")
     seed: int = opt.seed(0, opt.only_with("--plan"))
-    style: opt.FigureStyle = opt.if_only(opt.STYLE, opt.only_with("--plot"))
+    style: str = opt.if_only(opt.STYLE, opt.only_with("--plot"))
     table: bool = opt.if_only(opt.TABLE, WITHOUT_PLAN)
     as_json: bool = opt.JSON
 
@@ -230,7 +230,7 @@ def _written(found: sl.Calibration, wanted: list[Path], given: _Options, line: A
     if given.plot is not None:
         line.stage("drawing")
         create_folder(given.plot.parent)
-        with given.style.active():
+        with opt.figure_style(given.style):
             figure = sl.plot.calibration(found)
         sl.plot.save(figure, given.plot)
         files.append(given.plot)

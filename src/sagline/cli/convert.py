@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -16,40 +15,9 @@ from sagline.cli.terminal import show_note, show_text
 from sagline.core.numbers import n
 from sagline.files.writing import create_folder
 
-
-class _Format(StrEnum):
-    """Formats of the output."""
-
-    ROBOT = "robot"
-    MJCF = "mjcf"
-    JAVASCRIPT = "javascript"
-
-
-class _Inputs(StrEnum):
-    """Inputs of the winches in a unit of co-simulation."""
-
-    SPEEDS = "speeds"
-    LENGTHS = "lengths"
-
-
-class _Fmi(StrEnum):
-    """Versions of the Functional Mock-up Interface."""
-
-    FMI2 = "2"
-    FMI3 = "3"
-
-
-class _Unit(StrEnum):
-    """Units of lengths of a machine."""
-
-    MM = "mm"
-    INCH = "inch"
-    M = "m"
-
-
 LEAST = 1e-6  # smallest position error that is printed [m]
-ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf"), _Format.JAVASCRIPT: (".json",)}
-KINDS = {_Format.ROBOT: "a robot file", _Format.MJCF: "a MuJoCo model", _Format.JAVASCRIPT: "a robot for JavaScript"}
+ENDINGS = {"robot": (".yaml", ".yml"), "mjcf": (".xml", ".mjcf"), "javascript": (".json",)}
+KINDS = {"robot": "a robot file", "mjcf": "a MuJoCo model", "javascript": "a robot for JavaScript"}
 
 
 def convert(
@@ -59,10 +27,11 @@ def convert(
         "A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset.",
     ),
     out: Path | None = opt.STDOUT,
-    form: _Format = opt.option(
-        _Format.ROBOT,
+    form: str = opt.choice(
+        "robot",
         "KIND",
         "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables; javascript: JSON for JavaScript.",
+        tuple(KINDS),
         "--kind",
     ),
     linear_density: float | None = opt.quantity(
@@ -105,14 +74,14 @@ def convert(
     if out is not None and out.suffix.lower() not in ENDINGS[form]:
         step = f"Let it end in {ENDINGS[form][0]}, or choose another --kind."
         raise sl.FileError(out, f"is not a valid name for {KINDS[form]}", step)
-    if at is not None and form is not _Format.MJCF:
+    if at is not None and form != "mjcf":
         step = f"{KINDS[form].capitalize()} contains no pose. Leave the option out."
         raise sl.InvalidValueError("--at", f"given for {KINDS[form]}", "--kind mjcf", step)
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
-    if form is _Format.ROBOT:
+    if form == "robot":
         text = sl.dump_robot(imported.robot)
-    elif form is _Format.JAVASCRIPT:
+    elif form == "javascript":
         from sagline.share.machine import javascript_text
 
         text = javascript_text(imported.robot)
@@ -169,8 +138,8 @@ def _report(imported: sl.Imported, out: Path | None) -> None:
 def export_c(
     robot: str = opt.ROBOT,
     out: Path = opt.out(Path("sagline.c")),
-    tension: list[str] | None = opt.one_of(None, "METHOD", "Tension distribution method", opt.TENSIONS),
-    variable: opt.TensionVariable = opt.VARIABLE,
+    tension: list[str] | None = opt.choice(None, "METHOD", "Tension distribution method", opt.TENSIONS),
+    variable: Any = opt.VARIABLE,
     forward: bool = opt.flag(False, "Write the forward kinematics too.", "--forward"),
     single_precision: bool = opt.flag(
         False, "Single precision, for controllers without double precision in hardware.", "--float"
@@ -229,9 +198,9 @@ def export_fmu(
     robot: str = opt.ROBOT,
     out: Path = opt.out(Path("sagline.fmu")),
     pose: Any = opt.POSE,
-    inputs: _Inputs = opt.choice(_Inputs.SPEEDS, "INPUTS", "Inputs of the winches", _Inputs),
-    fmi: _Fmi = opt.choice(_Fmi.FMI3, "VERSION", "Version of the interface", _Fmi),
-    winches: opt.WinchModel = opt.WINCHES,
+    inputs: Any = opt.choice("speeds", "INPUTS", "Inputs of the winches", ("speeds", "lengths")),
+    fmi: Any = opt.choice("3", "VERSION", "Version of the interface", ("2", "3")),
+    winches: Any = opt.WINCHES,
     step: float | None = opt.STEP,
 ) -> None:
     """Write a robot with winches and a platform as a unit of co-simulation (FMU), for Simulink, Dymola and others.
@@ -246,19 +215,16 @@ def export_fmu(
     """
     loaded = sl.load_robot(robot)
     target = file_of(out, "sagline.fmu")
-    kinds: Any = (inputs.value, winches.value)
     create_folder(target.parent)
-    path = sl.export_fmu(loaded, target, start=pose, inputs=kinds[0], fmi=int(fmi), winches=kinds[1], step=step)
-    show_text(
-        f"{path}: {loaded.name} for FMI {fmi.value}, with {inputs.value} of {loaded.cable_count} winches", whole=True
-    )
+    path = sl.export_fmu(loaded, target, start=pose, inputs=inputs, fmi=int(fmi), winches=winches, step=step)
+    show_text(f"{path}: {loaded.name} for FMI {fmi}, with {inputs} of {loaded.cable_count} winches", whole=True)
 
 
 def export_linuxcnc(
     robot: str = opt.ROBOT,
     out: Path = opt.out(Path("cablekins.c")),
     pose: Any = opt.POSE,
-    unit: _Unit = opt.choice(_Unit.MM, "UNIT", "Unit of lengths of the machine", _Unit),
+    unit: Any = opt.choice("mm", "UNIT", "Unit of lengths of the machine", ("mm", "inch", "m")),
     tension: str = opt.TENSION,
 ) -> None:
     """Write the kinematics of a robot as a module for LinuxCNC: forward and inverse with sagging cables.
@@ -275,9 +241,8 @@ def export_linuxcnc(
     target = file_of(out, "cablekins.c")
     if target.suffix != ".c":
         raise sl.FileError(target, "is not a valid name for a C source", f"Let it end in .c: {target.stem}.c.")
-    kind: Any = unit.value
     source, settings = sl.export_linuxcnc(
-        loaded, target.parent, name=target.stem, unit=kind, tension=opt.tension_named(tension), home=pose
+        loaded, target.parent, name=target.stem, unit=unit, tension=opt.tension_named(tension), home=pose
     )
     show_text(f"{source}: kinematics of {loaded.name}; halcompile --install {source.name}", whole=True)
     show_text(f"{settings}: settings for the INI file of the machine", whole=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -18,14 +17,7 @@ if TYPE_CHECKING:
     from sagline.files.table import Measurements
 
 
-class _TensionPlace(StrEnum):
-    """Places on a cable where its tension can be measured."""
-
-    FRAME_END = "frame-end"
-    PLATFORM_END = "platform-end"
-    CHORD = "chord"
-
-
+PLACES = ("frame-end", "platform-end", "chord")
 STEPS = 25  # number of samples along each axis of the working range
 TABLE = "-cable.csv"
 TOLERANCE = 5e-3  # position error that the printed range keeps [m]; the article states 6 mm
@@ -39,9 +31,7 @@ def identify(
     tension_error: float = opt.quantity(
         1, "FORCE", "Standard error of a measured tension, 5 or '5 N'.", "N", above=0.0
     ),
-    tension_at: _TensionPlace = opt.choice(
-        _TensionPlace.FRAME_END, "PLACE", "Place of the tension measurement", _TensionPlace
-    ),
+    tension_at: str = opt.choice("frame-end", "PLACE", "Place of the tension measurement", PLACES),
     offset: bool = opt.flag(
         False, "Estimate the zero offset of the measured lengths as a further parameter.", "--offset/--no-offset"
     ),
@@ -65,7 +55,7 @@ def identify(
             *data,
             length_error=length_error,
             tension_error=tension_error,
-            tension_at=cast(Any, tension_at.value.replace("-", "_")),
+            tension_at=cast(Any, tension_at.replace("-", "_")),
             unknowns=["linear_density", "axial_stiffness", *["length_offset"] * offset],
         )
         model = _model(cable, data)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +15,6 @@ from sagline.cli.output import Output, TextTable, file_of, number_text, show_tab
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.arrays import Array
 from sagline.files.writing import file_stem
-
-
-class _Winding(StrEnum):
-    """Assumptions about the tension of the cable on the drums."""
-
-    CONSTANT = "constant"
-    REMEMBERED = "remembered"
-
 
 RUN = opt.argument(opt.NEEDED, "RUN.nc", "A run written by sagline track.")
 
@@ -45,11 +36,12 @@ def lengths(file: Path = RUN, out: Path | None = opt.STDOUT) -> int:
 
 def encoder(
     file: Path = RUN,
-    winding: _Winding = opt.option(
-        _Winding.CONSTANT,
+    winding: Any = opt.choice(
+        "constant",
         "WINDING",
         "Tension of the cable on the drums. constant: winding_tension of the winches; remembered: the tension at the "
         "time when the path wound the cable.",
+        ("constant", "remembered"),
     ),
     out: Path | None = opt.STDOUT,
 ) -> int:
@@ -65,7 +57,7 @@ def encoder(
     """
     out = out if out is None else file_of(out, f"{file.stem}-counts.csv")
     plan = _plan_of(file, out)
-    counts = np.atleast_2d(sl.encoder_counts(plan, winding.value))
+    counts = np.atleast_2d(sl.encoder_counts(plan, winding))
     whole = [[int(count) if count == count else count for count in row] for row in counts.tolist()]
     code = _write_rows(plan, "C{}", whole, out)
     winches = plan.robot.winches

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from copy import copy
 from dataclasses import dataclass, fields, is_dataclass
-from enum import StrEnum
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast, get_type_hints
@@ -30,40 +29,8 @@ Completion = Callable[[str], list[str]] | None
 NEEDED: Final[Any] = ...  # default of an argument or option that must be given
 
 FORMATS = ("png", "svg", "pdf")  # formats of figures
-
-
-class TensionVariable(StrEnum):
-    """Tension variables of the tension distribution methods."""
-
-    CHORD = "chord"
-    HORIZONTAL = "horizontal"
-    FRAME_END = "frame_end"
-
-
-class WinchModel(StrEnum):
-    """Models of winches."""
-
-    IDEAL = "ideal"
-    ROBOT = "robot"
-
-
-class FigureStyle(StrEnum):
-    """Styles of figures, by journal and width."""
-
-    PLAIN = "plain"
-    IEEE = "ieee"
-    IEEE_WIDE = "ieee-wide"
-    MDPI = "mdpi"
-    MDPI_WIDE = "mdpi-wide"
-    SLIDES = "slides"
-    SLIDES_WIDE = "slides-wide"
-
-    def active(self) -> AbstractContextManager[object]:
-        """Context in which figures get the style."""
-        if self is FigureStyle.PLAIN:
-            return nullcontext()
-        name, _, wide = self.value.partition("-")
-        return sl.plot.style(name, 2 if wide else 1)
+STYLES = ("plain", "ieee", "ieee-wide", "mdpi", "mdpi-wide", "slides", "slides-wide")  # journal and width of figures
+VARIABLES = ("chord", "horizontal", "frame_end")  # tension variables of the tension distribution methods
 
 
 MODELS: Final = tuple(word_of(name) for name in ordered_names("sagline.cables"))[::-1]
@@ -79,11 +46,19 @@ def model_named(name: str) -> sl.CableModel:
     return model_of(name)
 
 
-def tension_named(name: str, variable: TensionVariable = TensionVariable.CHORD) -> sl.TensionMethod:
+def tension_named(name: str, variable: Any = "chord") -> sl.TensionMethod:
     """The method of the option `--tension` with a tension variable."""
     from sagline.tension.methods import methods_by_name
 
-    return methods_by_name()[name.title().replace("-", "")](variable.value)
+    return methods_by_name()[name.title().replace("-", "")](variable)
+
+
+def figure_style(name: str) -> AbstractContextManager[object]:
+    """Context in which figures get the style of the option `--style`."""
+    if name == "plain":
+        return nullcontext()
+    journal, _, wide = name.partition("-")
+    return sl.plot.style(journal, 2 if wide else 1)
 
 
 def robot_completions(incomplete: str) -> list[str]:
@@ -128,13 +103,9 @@ def flag(default: bool, text: str, *more: str | Condition) -> bool:
     return option(default, "", text, *more)
 
 
-def choice(default: T, metavar: str, text: str, choices: type[StrEnum], *more: str | Condition) -> T:
-    """An option whose value is one of `choices`. The help lists them."""
-    return option(default, metavar, f"{text}: {', '.join(each.value for each in choices)}.", *more)
-
-
-def one_of(default: T, metavar: str, text: str, names: Sequence[str]) -> T:
-    """An option whose value is one of `names`, or several of them. The help lists them."""
+def choice(default: str | None, metavar: str, text: str, names: Sequence[str], *more: str | Condition) -> Any:
+    """An option whose value is one of `names`, or several of them. The help lists them unless `text` is a sentence."""
+    shown = text if text.endswith(".") else f"{text}: {', '.join(names)}."
 
     def check(given: str) -> str:
         if given not in names:
@@ -144,7 +115,7 @@ def one_of(default: T, metavar: str, text: str, names: Sequence[str]) -> T:
     def completions(incomplete: str) -> list[str]:
         return [name for name in names if name.startswith(incomplete)]
 
-    return option(default, metavar, f"{text}: {', '.join(names)}.", parser=check, autocompletion=completions)
+    return option(default, metavar, shown, *more, parser=check, autocompletion=completions)
 
 
 def converted(
@@ -230,11 +201,11 @@ OUTPUT = out(Path("output"))
 STDOUT: Path | None = out(None, "stdout")
 JSON = flag(False, "Print only the numbers on stdout, as JSON.", "--json")
 TABLE = flag(False, "Write the whole table as a CSV file.", "--csv/--no-csv")
-STYLE = choice(FigureStyle.PLAIN, "STYLE", "Style of the figures", FigureStyle)
+STYLE: str = choice("plain", "STYLE", "Style of the figures", STYLES)
 FORCE = flag(False, "Replace files that exist.", "--force")
-MODEL: str = one_of("catenary", "MODEL", "Cable model", MODELS)
-VARIABLE = choice(TensionVariable.CHORD, "VARIABLE", "Tension variable of the method", TensionVariable)
-TENSION: str = one_of("closest", "METHOD", "Tension distribution method", TENSIONS)
+MODEL: str = choice("catenary", "MODEL", "Cable model", MODELS)
+VARIABLE: Any = choice("chord", "VARIABLE", "Tension variable of the method", VARIABLES)
+TENSION: str = choice("closest", "METHOD", "Tension distribution method", TENSIONS)
 WRENCH = converted(
     None,
     "FX,FY,FZ[,MX,MY,MZ]",
@@ -257,7 +228,7 @@ GIVEN: Any = converted(
     "Default: x, y, z and, with four cables, the tension level.",
     lambda text, item: tuple(name.strip() for name in text.split(",")),
 )
-WINCHES = choice(WinchModel.IDEAL, "WINCHES", "Model of the winches", WinchModel)
+WINCHES: Any = choice("ideal", "WINCHES", "Model of the winches", ("ideal", "robot"))
 STEP: float | None = quantity(
     None, "TIME", "Time step of the integrator [s]. Default: a step that suits the robot.", "s", above=0.0
 )
@@ -305,7 +276,7 @@ class Files:
         "--format",
         only_with("--figures"),
     )
-    style: FigureStyle = if_only(STYLE, only_with("--figures"))
+    style: str = if_only(STYLE, only_with("--figures"))
     table: bool = TABLE
     as_json: bool = JSON
 
@@ -316,7 +287,7 @@ class DataFiles(Files):
 
     figures: bool = False
     formats: Any = ()
-    style: FigureStyle = FigureStyle.PLAIN
+    style: str = "plain"
 
 
 @dataclass(frozen=True)

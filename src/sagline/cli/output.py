@@ -17,7 +17,7 @@ from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from sagline.cli.options import Files
+from sagline.cli.options import Files, figure_style
 from sagline.cli.terminal import FREE, show_data, show_json, show_pieces, show_text
 from sagline.core.errors import FileError, printable
 from sagline.files.writing import check_files, check_folder, create_folder, write_text
@@ -185,7 +185,7 @@ class Output:
         from sagline.plot import save
 
         for make in figures:
-            with self._given.style.active():
+            with figure_style(self._given.style):
                 figure, name = make(), self._figures.pop(0)
             for suffix in self._given.formats:
                 save(figure, self.file(f"{name}.{suffix}"))

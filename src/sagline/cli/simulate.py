@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,23 +20,7 @@ if TYPE_CHECKING:
     from sagline.present.summaries import Summary
 
 
-class _ShaperKind(StrEnum):
-    """Input shapers, which reduce the vibration that a path excites."""
-
-    NONE = "none"
-    ZV = "zv"
-    ZVD = "zvd"
-    EI = "ei"
-
-
-class _CableMass(StrEnum):
-    """Models of the mass of moving cables."""
-
-    NONE = "none"
-    LUMPED = "lumped"
-    MODAL = "modal"
-
-
+SHAPERS = ("none", "zv", "zvd", "ei")  # input shapers, which reduce the vibration that a path excites
 BREAK = re.compile(r"([0-9]{1,3})@([^@]+)(?:@([^@]+))?")
 EVENT = ("time_s", "kind", "cable", "tension_before_n", "tension_after_n", "limit")
 STEP = "Give the cable and the time of the break: --break 3@2.5s."
@@ -62,11 +45,9 @@ def simulate(
         "Waypoints in .yaml, times and poses in .csv, or G-code in .ngc. Default: the platform is at rest at --pose.",
     ),
     pose: Any = opt.if_only(opt.POSE, opt.only_without("PATH")),
-    shaper: _ShaperKind = opt.choice(
-        _ShaperKind.NONE, "SHAPER", "Input shaper of the path", _ShaperKind, _FIXED, opt.only_with("PATH")
-    ),
-    cable_mass: _CableMass = opt.choice(_CableMass.NONE, "KIND", "Model of the cable mass", _CableMass),
-    winches: opt.WinchModel = opt.WINCHES,
+    shaper: str = opt.choice("none", "SHAPER", "Input shaper of the path", SHAPERS, _FIXED, opt.only_with("PATH")),
+    cable_mass: Any = opt.choice("none", "KIND", "Model of the cable mass", ("none", "lumped", "modal")),
+    winches: Any = opt.WINCHES,
     breaks: list[str] | None = _BREAKS,
     after: float = opt.quantity(3, "TIME", "Simulated time after the end of the path [s].", "s", low=0.0),
     step: float | None = opt.STEP,
@@ -104,14 +85,12 @@ def simulate(
     with working(f"{robot.name}: simulating") as line:
         start = _start(robot, way, pose, method, shaper, cable_mass, wrench, anchors, line)
         end = after if way is None else _duration(start) + after
-        line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass.value)}")
-        kind: Any = cable_mass.value
-        drives: Any = winches.value
+        line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass)}")
         if events and loss_time is None:
             given = initial_conditions(start, None, None, end)
-            assumed = losses_after_break(given, NODES if cable_mass is _CableMass.LUMPED else 0)
+            assumed = losses_after_break(given, NODES if cable_mass == "lumped" else 0)
             damping = sl.Damping(assumed.loss_time, air_damping)
-        options: Any = {"cable_mass": kind, "winches": drives, "events": events, "damping": damping}
+        options: Any = {"cable_mass": cable_mass, "winches": winches, "events": events, "damping": damping}
         simulation = sl.simulate(start, duration=end, step=step, anchors=anchors, **options)
         simulation.save(output.file(".nc"))
         output.table(".csv", simulation.table)
@@ -142,8 +121,8 @@ def _start(
     way: sl.Path | None,
     pose: sl.Pose | None,
     method: sl.TensionMethod,
-    shaper: _ShaperKind,
-    cable_mass: _CableMass,
+    shaper: str,
+    cable_mass: str,
     load: Array | None,
     anchors: sl.AnchorMotion | None,
     line: ProgressLine,
@@ -160,15 +139,15 @@ def _start(
                 "--pose", f"infeasible ({why or text})", "a feasible pose", "Change it, or the load."
             )
         return plan.state
-    if shaper is not _ShaperKind.NONE:
+    if shaper != "none":
         state = sl.inverse(robot, way.pose[len(way) - 1], wrench=load).state
         light = sl.modes(state)
-        heavy = cable_mass is not _CableMass.NONE
+        heavy = cable_mass != "none"
         frequency = sl.to_shape(sl.vibration(state, up_to=float(light.frequency.max())) if heavy else light, way)
         shaped_out = " and ".join(f"{value:.3f}" for value in frequency)
         kind = "with cable mass" if heavy else "massless"
-        show_note("Shaper: ", f"{shaper.value} for {shaped_out} Hz ({kind}), at the end of the path")
-        way = sl.shaped(way, {_ShaperKind.ZV: sl.ZV, _ShaperKind.ZVD: sl.ZVD, _ShaperKind.EI: sl.EI}[shaper](frequency))
+        show_note("Shaper: ", f"{shaper} for {shaped_out} Hz ({kind}), at the end of the path")
+        way = sl.shaped(way, {"zv": sl.ZV, "zvd": sl.ZVD, "ei": sl.EI}[shaper](frequency))
     progress = line.stage(f"{robot.name}: planning")
     return sl.inverse(robot, way, tension=method, wrench=load, anchors=anchors, progress=progress)
 

@@ -23,7 +23,7 @@ def tension(
     name: str = opt.ROBOT,
     pose: Any = opt.POSE,
     model: str = opt.MODEL,
-    variable: opt.TensionVariable = opt.VARIABLE,
+    variable: Any = opt.VARIABLE,
     wrench: Any = opt.WRENCH,
     payload: float | None = opt.PAYLOAD,
     files: opt.Files = opt.Files(),
@@ -46,16 +46,16 @@ def tension(
     drawn = files.figures and robot.cable_count == robot.degrees_of_freedom + 2
     output = Output(files, file_stem(robot.name), (), ["-tension"] * drawn, TABLE)
     least = sl.inverse(
-        robot, place, model, sl.MinimumNorm(variable.value), wrench
+        robot, place, model, sl.MinimumNorm(variable), wrench
     )  # raises an error if no method is defined for the robot
     fewer_cables = is_underconstrained(robot)
     plans: dict[str, sl.Plan | None] = {"balance": least}
     if not fewer_cables:
         methods = {title: method for title, method in methods_by_name().items() if title not in LEFT_OUT}
-        plans = {title: _plan(robot, place, model, method(variable.value), wrench) for title, method in methods.items()}
+        plans = {title: _plan(robot, place, model, method(variable), wrench) for title, method in methods.items()}
     why = reason(robot, place, least)
     margin = None if fewer_cables else float(sl.capacity_margin(least.state))
-    shape = sl.tension_polygon(robot, place, model, wrench, variable.value) if drawn else None
+    shape = sl.tension_polygon(robot, place, model, wrench, variable) if drawn else None
     for text in least.warnings:
         show_note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):

@@ -31,7 +31,7 @@ def track(
     ),
     model: str = opt.MODEL,
     tension: str = opt.TENSION,
-    variable: opt.TensionVariable = opt.VARIABLE,
+    variable: Any = opt.VARIABLE,
     wrench: Any = opt.WRENCH,
     payload: float | None = opt.PAYLOAD,
     uncertainty: bool = opt.flag(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -22,17 +21,6 @@ from sagline.files.writing import file_stem
 if TYPE_CHECKING:
     from sagline.cli.terminal import ProgressLine
     from sagline.dynamics.vibration.vibration import ListedMode
-
-
-class _Direction(StrEnum):
-    """Axes along which a force or about which a moment acts."""
-
-    X = "x"
-    Y = "y"
-    Z = "z"
-    ABOUT_X = "about x"
-    ABOUT_Y = "about y"
-    ABOUT_Z = "about z"
 
 
 LEAST_SHARE = 0.05  # smallest share of the platform in a printed mode; the file has all modes
@@ -65,11 +53,11 @@ def vibrate(
     ),
     loss_time: float | None = opt.LOSS_TIME,
     air_damping: float = opt.AIR_DAMPING,
-    axis: _Direction = opt.choice(
-        _Direction.X,
+    axis: str = opt.choice(
+        "x",
         "AXIS",
         "Axis of the force or moment in the figure of the response",
-        _Direction,
+        ("x", "y", "z", "about x", "about y", "about z"),
         opt.only_with("--figures"),
         WITHOUT_MAP,
     ),
@@ -121,11 +109,11 @@ def vibrate(
     return 0
 
 
-def _draw(found: sl.Vibration, axis: _Direction, film: int | None, output: Output, line: ProgressLine) -> None:
+def _draw(found: sl.Vibration, axis: str, film: int | None, output: Output, line: ProgressLine) -> None:
     """Draw the response of a stable equilibrium with modes, and the animation of the mode `film`."""
     if found.status is sl.VibrationStatus.SOLVED and found.frequency.size:
         line.stage("drawing the response")
-        output.draw(lambda: sl.plot.response(found, axis.value))
+        output.draw(lambda: sl.plot.response(found, axis))
     if film is not None:
         sl.plot.film(found, film, output.file(f"-mode-{film}.gif"), progress=line.stage(f"filming mode {film}"))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,14 +23,6 @@ if TYPE_CHECKING:
 
 LIMIT = ("criterion", "cable", "share")
 MOST_LIMITS = 12  # largest number of limits that are printed
-
-
-class _HullName(StrEnum):
-    """Hulls of a workspace: from the exact margin, from its lower bound (inner) or from its upper bound (outer)."""
-
-    EXACT = "exact"
-    INNER = "inner"
-    OUTER = "outer"
 
 
 @dataclass(frozen=True)
@@ -109,10 +100,11 @@ def workspace(
         10, "TIME", "Largest time for the proof of --prove [s].", "s", opt.only_with("--prove"), above=0.0
     ),
     cells: int = opt.option(32, "NUMBER", "Cells of the grid along the longest edge of the box."),
-    hull: _HullName = opt.option(
-        _HullName.EXACT,
+    hull: str = opt.choice(
+        "exact",
         "HULL",
         "Hull from the exact margin, from its lower bound (inner) or from its upper bound (outer).",
+        ("exact", "inner", "outer"),
         "--hull",
     ),
     given: Any = opt.GIVEN,
@@ -145,7 +137,7 @@ def workspace(
     if to_prove is not None:
         check_provable(robot)
     with working(f"{robot.name}: workspace") as line:
-        how: dict[str, Any] = {"model": cable, "cells": cells, "hull": hull.value, "progress": line.progress}
+        how: dict[str, Any] = {"model": cable, "cells": cells, "hull": hull, "progress": line.progress}
         space = sl.workspace(robot, box, loads, orientations=sl.Tilts(tilt), criteria=criteria, given=given, **how)
         proof = None
         if to_prove is not None:
