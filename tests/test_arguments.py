@@ -74,6 +74,18 @@ def test_a_valid_object_is_returned_unchanged() -> None:
     assert whole_number(np.int8(3), "points", 2) == 3
 
 
+@pytest.mark.parametrize("count", [1, 8, 60])
+def test_a_long_list_of_words_ends_with_a_whole_word_and_the_number_of_the_others(count: int) -> None:
+    words = [f"word_{'x' * (k % 7)}_{k}" for k in range(count)]
+    with pytest.raises(InvalidValueError) as caught:
+        choice("?", "name", words)
+    listed, _, others = caught.value.allowed.partition(" and ")
+    shown = listed.split(", ")
+    assert shown == words[: len(shown)]
+    assert others == ("" if count < 60 else f"{count - len(shown)} more")
+    assert caught.value.allowed in str(caught.value)  # no part of the message is shortened
+
+
 @pytest.mark.parametrize(
     ("call", "parts"),
     [
