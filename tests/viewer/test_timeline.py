@@ -18,7 +18,6 @@ from sagline.viewer.playback import PlayedPlan, PlayedSimulation
 from sagline.viewer.player import Beside, Player
 from sagline.viewer.server import start_server, stop_server
 from sagline.viewer.session import LogFollower, PlayedLog
-from sagline.viewer.tension_scale import ForceUnit
 from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
 from sagline.viewer.timeline import (
     MOST_SPANS,
@@ -38,7 +37,6 @@ from tests.viewer.shown import Shown, shown, tell
 ROBOT = sl.load_robot("article-mixed")
 PLAN = sl.inverse(ROBOT, sl.quintic_path([(0, 0, 1.5), (7.5, 3.5, 1.5), (0, 0, 1.5)], durations=[4.0, 4.0], rate=10))
 OTHER = sl.inverse(ROBOT, sl.quintic_path([(0, 0, 1.5), (0, 1, 1.5)], durations=[9.0], rate=10))
-UNIT = ForceUnit("N", 1.0, ".1f")
 
 
 @pytest.fixture(scope="module")
@@ -203,7 +201,7 @@ def test_tensions_beyond_their_limits_are_spans_with_their_worst() -> None:
     robot = ROBOT.replace(tension_min=20.0, tension_max=500.0)
     tension = np.full((6, 8), 100.0)
     tension[1:3, 4], tension[2, 5], tension[4, 0] = [12.0, 14.0], 700.0, np.nan
-    ((*ends, why),) = limit_violations(robot, np.arange(6.0), tension, UNIT)
+    ((*ends, why),) = limit_violations(robot, np.arange(6.0), tension)
     assert ends == [1.0, 3.0]
     told = re.findall(r"cable (\d) (below|above) ([\d.]+) N: ([\d.]+) N[\w ]+winch", why)
     assert told == [("4", "below", "20.0", "12.0"), ("5", "above", "500.0", "700.0")]

@@ -61,6 +61,11 @@ def _no_entry(index: object, size: int) -> NoSuchEntryError:
     return NoSuchEntryError("index", brief(index), allowed, f"The batch has {size}; indices start at 0.")
 
 
+def true_runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First index and end of each run of True in `flags`, in order, shape (k, 2)."""
+    return np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))).reshape(-1, 2)
+
+
 def evenly_spaced(count: int, most: int) -> NDArray[np.int64]:
     """At most `most` of the indices 0 to `count` - 1, at nearly equal steps, with the first and the last index."""
     places = np.linspace(0, max(count - 1, 0), min(count, most))

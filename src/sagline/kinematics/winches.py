@@ -12,6 +12,7 @@ from sagline.cables.cable import Creep
 from sagline.core.arguments import choice, instance, optional
 from sagline.core.arrays import Array, Flags, kernel_input, locked, numbers
 from sagline.core.errors import InvalidValueError
+from sagline.core.indices import true_runs
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory
@@ -307,10 +308,9 @@ def _exceeds(values: Array | None, limit: Array | None) -> Flags | None:
 def _differences(time: Array, values: Array) -> Array:
     """Rates of `values` (N, m), computed separately in each range of valid samples; NaN for a range of one sample."""
     found = np.full(values.shape, np.nan)
-    kept = np.isfinite(values).all(axis=-1)
+    kept = np.asarray(np.isfinite(values).all(axis=-1))
     gradient: Any = np.gradient  # the type annotations of the library do not support arrays with two axes
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], kept, [False])).astype(np.int8))).reshape(-1, 2)
-    for first, end in edges:
+    for first, end in true_runs(kept):
         if end - first > 1:
             order = 2 if end - first > 2 else 1
             found[first:end] = gradient(values[first:end], time[first:end], axis=0, edge_order=order)

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from sagline.calibration.result import Calibration
+from sagline.core.indices import true_runs
 from sagline.dynamics.simulation.results import Simulation
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
@@ -32,10 +32,10 @@ from sagline.plot.sheet import (
     cable_look,
     draw_series,
     format_axes,
+    format_clock,
     shade_spans,
     sheet,
     svg_text,
-    true_runs,
     unique_names,
 )
 from sagline.plot.style import PLAIN, Using
@@ -151,11 +151,7 @@ def _time_lines(
         look = {"color": COLORS[i], "label": names[i]} if names else {**cable_look(i), "label": f"cable {i}"}
         draw_series(ax, clock[chosen], line, **look, linewidth=1.2)
     shade_spans(ax, clock, true_runs(gaps)[:MOST_SAMPLES], "not feasible")
-    format_axes(ax, axis, label)
-    if axis == "pose":
-        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if clock.size > 1:
-        ax.set_xlim(clock[0], clock[-1])
+    format_clock(ax, clock, label, axis)
     name_lines(ax)
     return figure
 

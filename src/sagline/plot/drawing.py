@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import floor, log10
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -20,6 +19,7 @@ from sagline.plot.sheet import Sheet, axes_or_new
 from sagline.plot.style import current
 from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
+from sagline.viewer.shapes import round_below
 from sagline.viewer.tension_scale import TensionScale
 
 if TYPE_CHECKING:
@@ -209,8 +209,7 @@ def _label_boxes(places: Sequence[Array], size: float) -> list[Array]:
 def _free_axes(occupied: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
     """Draw the directions of the world axes in the emptiest corner of the picture."""
     width = float(np.ptp(limits[0]))
-    decade = 10.0 ** floor(log10(ARROW * width))
-    length = max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= ARROW * width)
+    length = round_below(ARROW * width)
     ends = length * view[:2].T
     low, high = np.minimum(ends.min(axis=0), 0.0) - 1.4 * size, np.maximum(ends.max(axis=0), 0.0) + 1.4 * size
     corners = [np.array([x, y]) for y in (limits[1, 0] - low[1], limits[1, 1] - high[1])

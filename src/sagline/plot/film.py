@@ -15,8 +15,9 @@ from sagline.core.arguments import callback, file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.dynamics.vibration.vibration import WITH_MASS, ListedMode, Vibration, listed_modes
 from sagline.files.writing import atomic_file
-from sagline.plot.robot import EDGES, fit_space, platform_box
+from sagline.plot.robot import fit_space, platform_box
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
+from sagline.viewer.shapes import BOX_EDGES
 from sagline.viewer.swing import PERIOD, Swing
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     for course in swing.rest:
         ax.plot(*course.T, color=GAP_COLOR, linewidth=0.8)
     cables = [ax.plot(*course.T, color=BLUE, linewidth=1.3)[0] for course in swing.rest]
-    edges = [ax.plot([0.0], [0.0], [0.0], color=VERMILLION, linewidth=1.6)[0] for _ in EDGES]
+    edges = [ax.plot([0.0], [0.0], [0.0], color=VERMILLION, linewidth=1.6)[0] for _ in BOX_EDGES]
     ax.scatter(*robot.frame_anchors.T, color="black", s=7.0, depthshade=False)
     for artist in ax.get_children():
         artist.set_clip_on(False)  # the axes are square, but the picture is wider than high
@@ -95,7 +96,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
         for line, course in zip(cables, swing.courses(phase), strict=True):
             line.set_data_3d(*course.T)
         corners = platform_box(robot, swing.pose(phase))
-        for line, (a, b) in zip(edges, EDGES, strict=True):
+        for line, (a, b) in zip(edges, BOX_EDGES, strict=True):
             line.set_data_3d(*corners[[a, b]].T)
         figure.set_dpi(DOTS)
         canvas.draw()

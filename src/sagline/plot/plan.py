@@ -9,6 +9,7 @@ import numpy as np
 
 from sagline.core.arguments import HOW_TO_GET, choice, instance
 from sagline.core.errors import InvalidValueError
+from sagline.core.indices import evenly_spaced, true_runs
 from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
@@ -134,7 +135,7 @@ def _values(plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> t
 def _format(ax: Axes, plan: Plan, label: str) -> None:
     """Shade the infeasible poses. Set labels and limits of axes over time, or over the numbers of poses."""
     clock, axis = abscissa(plan)
-    sheet.shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    sheet.shade_spans(ax, clock, [(gap.first, gap.last + 1) for gap in plan.gaps], INFEASIBLE)
     sheet.format_clock(ax, clock, label, axis)
 
 
@@ -215,7 +216,7 @@ def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
     sheet.draw_components(ax, clock, 1e3 * np.atleast_2d(confirmation.position_error))
     _format(ax, plan, "position error [mm]")
     lost = np.atleast_1d(plan.feasible & ~confirmation.held)
-    sheet.shade_spans(ax, clock, sheet.true_runs(lost), UNCONFIRMED, sheet.ORANGE, 0.25)
+    sheet.shade_spans(ax, clock, true_runs(lost), UNCONFIRMED, sheet.ORANGE, 0.25)
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -LEAST_ERROR), max(high, LEAST_ERROR))
 
@@ -346,6 +347,5 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 def _arrow_samples(path: Path) -> list[int]:
     """Samples for arrows, before the middle of each motion between two rests. Of many motions, an even selection."""
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
-    moves = np.array(sheet.true_runs(speed > 1e-3 * speed.max(initial=0.0)), dtype=np.intp).reshape(-1, 2)
-    chosen = moves[np.unique(np.linspace(0, len(moves) - 1, min(len(moves), MOST_ARROWS)).astype(np.intp))]
-    return [int(first + 0.42 * (last + 1 - first)) for first, last in chosen]
+    moves = true_runs(speed > 1e-3 * speed.max(initial=0.0))
+    return [int(first + 0.42 * (end - first)) for first, end in moves[evenly_spaced(len(moves), MOST_ARROWS)]]

@@ -16,6 +16,7 @@ from sagline.plot.labels import name_lines, write_beside
 from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 from sagline.tension.polygon import TensionPolygon
+from sagline.viewer.shapes import grouped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -114,12 +115,9 @@ def _draw_places(ax: Axes, groups: Sequence[tuple[Array, list[str]]]) -> None:
 
 def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array, list[str]]]:
     """Places that are farther apart than `least`. Each has the names of all `places` that are closer to it."""
-    groups: list[tuple[Array, list[str]]] = []
-    for name, place in places.items():
-        if np.isfinite(place).all():
-            same = [names for other, names in groups if np.linalg.norm(place - other) <= least]
-            same[0].append(name) if same else groups.append((place, [name]))
-    return groups
+    names = [name for name, place in places.items() if np.isfinite(place).all()]
+    known = np.array([places[name] for name in names])
+    return [(known[group[0]], [names[k] for k in group]) for group in grouped(known, least)]
 
 
 # name of a side: text, middle of the side [N], offset and half size of the name [pt], True if moved outward

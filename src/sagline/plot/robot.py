@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations, product
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -35,10 +34,6 @@ if TYPE_CHECKING:
 
 POINTS = 50  # points around each pulley
 FLAT = 1e-6  # the shadow of a platform that is thinner than this share of the robot's size is a line
-_SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-EDGES = tuple(  # edges of a box: two corners that differ in a single coordinate
-    (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
-)
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.5", "0.955", "0.82", "0.4"
 SAME_PLACE = 0.04  # anchors that are closer than this share of the robot's size have a common label
@@ -86,8 +81,8 @@ def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], 
             others.append(Stroke(run, WHEEL_COLOR, 0.7, "-" if upright else ":", 1.8))
     frame, body = _frame_box(robot), platform_box(robot, pose)
     if frame is not None:
-        others += [Stroke(frame[[*edge]], FRAME_COLOR, 0.7, "-", 1.7, covers=True) for edge in EDGES]
-    return cables, others + [Stroke(body[[*edge]], VERMILLION, 1.2, "-", 2.3) for edge in EDGES]
+        others += [Stroke(frame[[*edge]], FRAME_COLOR, 0.7, "-", 1.7, covers=True) for edge in shapes.BOX_EDGES]
+    return cables, others + [Stroke(body[[*edge]], VERMILLION, 1.2, "-", 2.3) for edge in shapes.BOX_EDGES]
 
 
 def _rims(ends: Array, radius: float) -> Array:
@@ -105,28 +100,23 @@ def _frame_box(robot: Robot) -> Array | None:
     top = robot.frame_anchors.max(axis=0)
     middle = 0.5 * (top + robot.frame_anchors.min(axis=0))
     middle[2] = top[2] - 0.5 * robot.frame_size[2]
-    return _box_corners(middle, robot.frame_size)
+    return shapes.box_corners(middle - 0.5 * robot.frame_size, middle + 0.5 * robot.frame_size)
 
 
 def platform_box(robot: Robot, pose: Pose) -> Array:
     """Corners of the platform in the world, shape (8, 3): the box of its size, or the box around its anchors."""
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
-    size = high - low if robot.platform_size is None else robot.platform_size
-    corners: Array = pose.position + _box_corners(0.5 * (low + high), size) @ pose.matrix.T
-    return corners
-
-
-def _box_corners(middle: Array, size: Array) -> Array:
-    """The eight corners of a box, shape (8, 3)."""
-    corners: Array = middle + 0.5 * size * _SIGNS
-    return corners
+    if robot.platform_size is not None:
+        middle = 0.5 * (low + high)
+        low, high = middle - 0.5 * robot.platform_size, middle + 0.5 * robot.platform_size
+    return np.asarray(pose.transform(shapes.box_corners(low, high)))
 
 
 def ground(points: Array, platform: Array) -> tuple[Array, Array]:
     """Corners (k, 3) of the ground (at z = 0 or below the lowest point), and of the platform's shadow on it."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = min(0.0, float(low[2]))
-    outline = _box_corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
+    outline = shapes.box_corners(low, high)[[0, 2, 6, 4], :2]
     shadow = platform[:, :2]
     if np.linalg.matrix_rank(shadow - shadow[0], tol=FLAT * float(np.ptp(points))) == 2:
         shadow = shadow[ConvexHull(shadow).vertices]
@@ -191,10 +181,7 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
 def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
     """Write each cable's number above and outside its anchor. Anchors that are close have a common label."""
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    left = list(range(len(anchors)))
-    while left:
-        together = [k for k in left if np.linalg.norm(anchors[k] - anchors[left[0]]) <= SAME_PLACE * size]
-        left = [k for k in left if k not in together]
+    for together in shapes.grouped(anchors, SAME_PLACE * size):
         place = anchors[together].mean(axis=0)
         out = (place - points.mean(axis=0)) * (1.0, 1.0, 0.0)
         out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have numbers below

@@ -10,6 +10,7 @@ from sagline.control.execution import Execution, null_space_error, position_erro
 from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
+from sagline.core.indices import true_runs
 from sagline.core.numbers import ROUNDING, n, prefixed_unit
 from sagline.dynamics.simulation.results import Simulation
 from sagline.plot import sheet
@@ -188,7 +189,7 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
     looks[None] = sheet.GAP_COLOR, "standing"
     for code, (color, name) in looks.items():
         there = ~np.isin(done.state, list(STATES)) if code is None else done.state == code
-        spans = [(clock[first], clock[last] + done.period - clock[first]) for first, last in sheet.true_runs(there)]
+        spans = [(clock[first], clock[end - 1] + done.period - clock[first]) for first, end in true_runs(there)]
         if spans:
             ax.broken_barh(spans, (0.0, 1.0), facecolors=color, label=name, linewidth=0.0)
     sheet.format_clock(ax, clock, "")

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
     from matplotlib.colors import Normalize
 
-    from sagline.core.arrays import Array, Flags
+    from sagline.core.arrays import Array
 
 # Okabe and Ito 2008, "Color universal design"; two colors that are too pale for lines on white are left out
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
@@ -219,24 +219,18 @@ def draw_components(ax: Axes, clock: Array, courses: Array, name: str = "{}") ->
         draw_series(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name.format(axis)}$")
 
 
-def true_runs(flags: Flags) -> list[tuple[int, int]]:
-    """First and last index of each sequence of True in `flags`."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
-    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
-
-
 def shade_spans(
-    ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str, color: str = GAP_COLOR, alpha: float = 0.5
+    ax: Axes, clock: Array, spans: Iterable[Any], label: str, color: str = GAP_COLOR, alpha: float = 0.5
 ) -> None:
-    """Shade `spans` of samples (first, last). Each span is extended halfway to the neighboring samples."""
+    """Shade `spans` of samples (first, end). Each span is extended halfway to the neighboring samples."""
     if clock.size > 1:
         middles = [0.5 * (before + after) for before, after in pairwise(clock)]
         edges = np.array([clock[0], *middles, clock[-1]])
     else:
         edges = clock[0] + np.array([-0.5, 0.5])
-    for k, (first, last) in enumerate(spans):
+    for k, (first, end) in enumerate(spans):
         name = label if k == 0 else "_"
-        ax.axvspan(edges[first], edges[last + 1], color=color, alpha=alpha, linewidth=0.0, label=name, zorder=0.5)
+        ax.axvspan(edges[first], edges[end], color=color, alpha=alpha, linewidth=0.0, label=name, zorder=0.5)
 
 
 def svg_text(figure: Figure, dots: int, **settings: str) -> str:

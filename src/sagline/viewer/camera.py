@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
-from sagline.viewer.shapes import Solid
+from sagline.viewer.shapes import Solid, box_corners
 
 OUTSIDE: Final = 10.0  # largest coordinate of a point of a picture; (0, 0) is its upper left, (1, 1) its lower right
 
@@ -115,8 +115,7 @@ def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tupl
     right /= np.linalg.norm(right)
     axes = np.stack((right, np.cross(TOWARD, right), -TOWARD))
     middle = 0.5 * (low + high)
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-    x, y, depth = axes @ (BORDER * (corners - middle)).T
+    x, y, depth = axes @ (BORDER * (box_corners(low, high) - middle)).T
     slope = np.tan(0.5 * field)
     far = max(_nearest(x, depth, slope * aspect), _nearest(y, depth, slope))
     target = middle + _centered(x, far + depth) * axes[0] + _centered(y, far + depth) * axes[1]

@@ -9,6 +9,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
+from sagline.core.indices import evenly_spaced
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.dynamics.simulation.results import Occurrence, Simulation
@@ -20,7 +21,7 @@ from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
-from sagline.viewer.timeline import Chart, Track, cable_names, chart_limits, infeasible_spans, limit_violations
+from sagline.viewer.timeline import Chart, Track, infeasible_spans, limit_violations, tension_chart
 
 CABLES: Final = {
     "none": "massless cables",
@@ -71,20 +72,16 @@ class PlayedPlan(Played):
 
     def track(self) -> Track:
         """Charts of the limited tensions and the lengths, and spans of infeasible poses."""
-        plan, robot, unit = self.plan, self.robot, force_unit(self.robot)
-        name = "Chord tension" if robot.tension_limits_of == "chord" else "Tension at the winch"
-        limits = chart_limits(robot, unit.newtons, at=robot.tension_limits_of)
-        cables = cable_names(robot)
-        tension = Chart(
-            name, unit.name, unit.decimals, cables, lambda rows: plan.state.limited_tension[rows] / unit.newtons, limits
-        )
-        length = Chart("Unstrained length", "m", 4, cables, lambda rows: plan.unstrained_length[rows])
+        plan, limited = self.plan, self.robot.tension_limits_of
+        name = "Chord tension" if limited == "chord" else "Tension at the winch"
+        tension = tension_chart(name, self.robot, plan.state.limited_tension, limited)
+        length = Chart("Unstrained length", "m", 4, tension.names, lambda rows: plan.unstrained_length[rows])
         paths = (("desired", WANTED), ("actual", ACTUAL))
-        return Track(self.time, (tension, length), infeasible_spans(plan, self.time, unit), (), paths)
+        return Track(self.time, (tension, length), infeasible_spans(plan, self.time), (), paths)
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= `most`, with a scaled error; NaN in gaps."""
-        rows = self.traced_samples(most)
+        rows = evenly_spaced(len(self.time), most)
         wanted = self.plan.state.pose.position[rows]
         return wanted, wanted + error_scale * self.confirmation.position_error[rows]
 
@@ -152,18 +149,14 @@ class PlayedSimulation(Played):
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired positions, all NaN, and actual positions, both of shape (n, 3) with n <= `most`."""
-        rows = self.traced_samples(most)
+        rows = evenly_spaced(len(self.time), most)
         actual = self.simulation.pose.position[rows]
         return np.full_like(actual, np.nan), actual
 
     def track(self) -> Track:
         """Charts of the tensions at the frame ends and the displacement, and the events."""
-        simulation, robot, unit = self.simulation, self.robot, force_unit(self.robot)
-        limits = chart_limits(robot, unit.newtons, at="frame_end")
-        cables = cable_names(robot)
-        winch, newtons = "Tension at the winch", unit.newtons
-        tension = Chart(winch, unit.name, unit.decimals, cables, lambda rows: self.tension[rows] / newtons, limits)
-        position = simulation.pose.position
+        simulation, unit = self.simulation, force_unit(self.robot)
+        tension, position = tension_chart("Tension at the winch", self.robot, self.tension), simulation.pose.position
         away = Chart(
             "Motion along x, y, z", "mm", 1, ("x", "y", "z"), lambda rows: 1e3 * (position[rows] - position[0])
         )
@@ -171,5 +164,5 @@ class PlayedSimulation(Played):
         marks = tuple(
             (event.time - began, _event_text(event, unit), event.kind in FAILURES) for event in simulation.events
         )
-        spans = limit_violations(robot, self.time, self.tension, unit)
+        spans = limit_violations(self.robot, self.time, self.tension)
         return Track(self.time, (tension, away), spans, marks, (("actual", ACTUAL),))

@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from sagline.cables.models import Catenary
-from sagline.core.arrays import Array, Indices
+from sagline.core.arrays import Array
 from sagline.robot.batch import dead_cable, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -96,10 +96,6 @@ class Played(Protocol):
     def index_at(self, time: float) -> int:
         """Index of the last sample at or before a time [s]; 0 for earlier times."""
         return max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-
-    def traced_samples(self, most: int) -> Indices:
-        """Indices of at most `most` evenly distributed samples."""
-        return np.unique(np.linspace(0, self.time.size - 1, most).astype(np.int64))
 
     def at(self, time: float) -> Configuration:
         """The sample at or before a time [s]."""

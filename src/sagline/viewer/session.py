@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array, Codes
+from sagline.core.indices import evenly_spaced
 from sagline.core.numbers import n
 from sagline.files.execution_file import plan_of_log
 from sagline.files.mcap_layout import NANO
@@ -23,7 +24,7 @@ from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
 from sagline.viewer.tension_scale import force_unit, number_text
-from sagline.viewer.timeline import Chart, Span, Track, cable_names, chart_limits, limit_violations, spans_of
+from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of, tension_chart
 
 PER_METER = 1e3  # mm per m
 MOST_EVENTS = 8  # largest number of listed events, the newest
@@ -51,24 +52,17 @@ class PlayedLog(Played):
     length: Array  # lengths from the encoders, with the zeros of homing [m], shape (N, m)
     set_length: Array  # set points of the lengths [m], shape (N, m)
     events: tuple[Event, ...]
-    shown: Array = field(init=False)  # index of the last cycle with a known position up to each cycle, or of the first
 
     name = "log"
     unchanged = "A log keeps its robot and loads; drag the platform to change them."
-
-    def __post_init__(self) -> None:
-        """Determine, for each cycle with an unknown position, the cycle whose position is shown instead."""
-        known = np.flatnonzero(np.isfinite(self.position[:, 0]))
-        last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
-        rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
-        object.__setattr__(self, "shown", rows)
 
     def pose_at(self, index: int) -> Pose:
         """Planned pose of the cycle `index`. Without a plan, its estimated pose, or the last known pose."""
         if np.isfinite(self.planned[index]).all():
             return Pose.from_quaternion(self.planned[index], self.planned_quaternion[index])
-        row = int(self.shown[index])
-        if row >= 0:
+        known = np.flatnonzero(np.isfinite(self.position[:, 0]))
+        if known.size:
+            row = known[max(int(np.searchsorted(known, index, side="right")) - 1, 0)]
             return Pose.from_quaternion(self.position[row], self.quaternion[row])
         box, anchors = self.robot.test_box, self.robot.frame_anchors
         return Pose(anchors.mean(axis=0) if box is None else 0.5 * (box.low + box.high), np.eye(3))
@@ -121,22 +115,21 @@ class PlayedLog(Played):
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Planned and estimated positions (n, 3), n <= `most`."""
-        rows = self.traced_samples(most)
+        rows = evenly_spaced(len(self.time), most)
         planned, actual = self.planned[rows], self.position[rows]
         away = actual - planned
         return planned, np.where(np.isfinite(away), planned + error_scale * away, actual)
 
     def track(self) -> Track:
         """Charts of the tensions and of the errors of tensions, lengths and position, and the events."""
-        unit, cables, axes = force_unit(self.robot), cable_names(self.robot), ("x", "y", "z")
-        limits = chart_limits(self.robot, unit.newtons, at="frame_end")
+        tension, axes = tension_chart("Tension, measured", self.robot, self.tension), ("x", "y", "z")
+        cables = tension.names
 
         def error(value: Array, reference: Array, scale: float = PER_METER) -> Callable[[slice], Array]:
             return lambda rows: scale * (value[rows] - reference[rows])
 
-        name, decimals, newtons = unit.name, unit.decimals, unit.newtons
         charts = [
-            Chart("Tension, measured", name, decimals, cables, lambda rows: self.tension[rows] / newtons, limits),
+            tension,
             Chart("Tension minus planned tension", "N", 1, cables, error(self.tension, self.planned_tension, 1.0)),
             Chart("Set length minus measured length", "mm", 2, cables, error(self.set_length, self.length)),
             Chart("Estimated minus planned", "mm", 2, axes, error(self.position, self.planned)),
@@ -159,7 +152,7 @@ class PlayedLog(Played):
             return State(int(state[np.isin(state, WRONG)][0])).name
 
         faults = spans_of(self.time, np.isin(self.state, WRONG), why)
-        return tuple(sorted(faults + limit_violations(self.robot, self.time, self.tension, force_unit(self.robot))))
+        return tuple(sorted(faults + limit_violations(self.robot, self.time, self.tension)))
 
 
 class LogFollower:

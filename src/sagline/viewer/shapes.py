@@ -49,12 +49,10 @@ def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
     """Dead lengths as vertical lines below the frame anchors; their paths are not known, only lengths and rises."""
     # returns frame anchors, and the points below them at the distance of the rises [m], shape (m, 2, 3); and True for
     # each dead length that is vertical, because its length is equal to its rise, shape (m,)
-    winches = robot.winches
-    low = robot.frame_anchors.copy()
-    if winches is None:
-        return np.stack((robot.frame_anchors, low), axis=1), np.ones(len(low), dtype=bool)
-    low[:, 2] -= winches.dead_rise
-    upright = winches.dead_cable - np.abs(winches.dead_rise) <= _UPRIGHT * winches.dead_cable
+    winches, low, upright = robot.winches, robot.frame_anchors.copy(), np.ones(robot.cable_count, dtype=bool)
+    if winches is not None:
+        low[:, 2] -= winches.dead_rise
+        upright = winches.dead_cable - np.abs(winches.dead_rise) <= _UPRIGHT * winches.dead_cable
     return np.stack((robot.frame_anchors, low), axis=1), upright
 
 
@@ -132,7 +130,9 @@ _THINNEST = 0.08  # smallest thickness of a platform, relative to its largest ed
 _SIDES = 20  # number of sides of a drum
 _WHEEL: Final = ((0.8, 0.97), (0.1, 0.26))  # radii of rim and hub, relative to the radius of the pulley
 _WHEEL_WIDTH, _SPOKE, _WHEEL_SIDES = 0.2, 0.055, 48
-_SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
+BOX_EDGES: Final = tuple(  # corners of a box, as in `box_corners`, that differ in a single coordinate
+    (a, b) for a, b in combinations(range(8), 2) if (a ^ b).bit_count() == 1
+)
 
 
 class Solid(NamedTuple):
@@ -150,19 +150,21 @@ def size_of(robot: Robot) -> float:
 
 def frame_solid(robot: Robot) -> Solid:
     """The twelve beams of the robot's box; they are dashed if the box is assumed."""
-    low, high = bounds(robot)
-    corners = low + (_SIGNS + 0.5) * (high - low)
-    edges = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1]
-    thick = _BEAM * size_of(robot)
+    corners, thick = box_corners(*bounds(robot)), _BEAM * size_of(robot)
     dash = _DASH * size_of(robot) if is_frame_assumed(robot) else np.inf
-    return _merged([beam for a, b in edges for beam in _beams(corners[a], corners[b], thick, dash)])
+    return _merged([beam for a, b in BOX_EDGES for beam in _beams(corners[a], corners[b], thick, dash)])
+
+
+def box_corners(low: Array, high: Array) -> Array:
+    """Corners of a box [m], shape (8, 3); z varies fastest."""
+    return np.array(list(product(*zip(low, high, strict=True))))
 
 
 def grouped(points: Array, near: float) -> list[list[int]]:
-    """Groups of the indices of points (m, d) that are closer than `near` to the first point of their group."""
+    """Groups of the indices of points (m, d) at a distance of at most `near` from the first point of their group."""
     groups: list[list[int]] = []
     for i, point in enumerate(points):
-        home = next((group for group in groups if np.linalg.norm(points[group[0]] - point) < near), None)
+        home = next((group for group in groups if np.linalg.norm(points[group[0]] - point) <= near), None)
         if home is None:
             groups.append([i])
         else:
@@ -185,7 +187,7 @@ def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
     """A beam from `start` to `end`, or dashes and gaps with lengths of about `dash`, with a dash at each end."""
     pieces = 2 * round(0.5 * float(np.linalg.norm(end - start)) / dash) + 1
     cuts = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (end - start)
-    return [cuboid(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
+    return [_cuboid(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
 
 
 def winch_solid(robot: Robot) -> Solid:
@@ -236,10 +238,10 @@ def platform_solid(robot: Robot) -> Solid:
     anchors = robot.platform_anchors
     low, high = anchors.min(axis=0), anchors.max(axis=0)
     if robot.platform_size is not None:
-        return cuboid(0.5 * (low + high), robot.platform_size)
+        return _cuboid(0.5 * (low + high), robot.platform_size)
     extent = high - low
     thinnest = max(_THINNEST * float(extent.max()), 0.002 * size_of(robot))
-    flat = cuboid(0.5 * (low + high), np.maximum(extent, thinnest))
+    flat = _cuboid(0.5 * (low + high), np.maximum(extent, thinnest))
     if extent.min() < thinnest:
         return flat
     try:
@@ -248,9 +250,9 @@ def platform_solid(robot: Robot) -> Solid:
         return flat
 
 
-def cuboid(middle: Array, edges: Array) -> Solid:
+def _cuboid(middle: Array, edges: Array) -> Solid:
     """A box along the axes."""
-    return _hull(middle + _SIGNS * edges)
+    return _hull(box_corners(middle - 0.5 * edges, middle + 0.5 * edges))
 
 
 def tube(points: Array, radius: float, sides: int = 6) -> Solid:

@@ -109,10 +109,8 @@ def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> Mar
 def _finer(values: Array) -> Array:
     """Values interpolated between those of each row, for pixels of equal width."""
     count = values.shape[1]
-    places = np.clip((np.arange(FINER * (count - 1)) + 0.5) / FINER, 0.0, count - 1.0)
-    first = np.minimum(places.astype(np.intp), count - 2)
-    share = places - first
-    return np.asarray((1.0 - share) * values[:, first] + share * values[:, first + 1])
+    places = (np.arange(FINER * (count - 1)) + 0.5) / FINER
+    return np.array([np.interp(places, np.arange(count), row) for row in values])
 
 
 def _segments(found: Any, cut: Slice) -> Array:

@@ -83,9 +83,7 @@ class TensionScale:
         """Color of each tension, shape (..., 3); gray for NaN."""
         known = np.isfinite(tension)
         place = self.fraction(np.where(known, tension, self.low)) * (len(_STEPS) - 1)
-        first = np.minimum(place.astype(np.intp), len(_STEPS) - 2)
-        rest = (place - first)[..., None]
-        mixed = (1.0 - rest) * _STEPS[first] + rest * _STEPS[first + 1]
+        mixed = np.stack([np.interp(place, np.arange(len(_STEPS)), part) for part in _STEPS.T], axis=-1)
         return np.where(known[..., None], np.rint(mixed).astype(np.uint8), GRAY)
 
     def linear_colors(self, tension: Array) -> Colors:

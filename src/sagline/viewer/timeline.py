@@ -8,13 +8,13 @@ from math import isfinite
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Flags
+from sagline.core.indices import true_runs
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
-from sagline.viewer.tension_scale import ForceUnit, cables_text
+from sagline.viewer.tension_scale import cables_text, force_unit
 
 # Colors of cables by number in charts, different from those of the platform, its path, tensions and verdicts. Their
 # contrast is 3 : 1 on the panels of both themes.
@@ -70,26 +70,22 @@ class Track:
         return float(self.time[min(max(now + steps, 0), self.time.size - 1)])
 
 
-def cable_names(robot: Robot) -> tuple[str, ...]:
-    """The names of the lines of a chart of cables."""
-    return tuple(map(str, range(robot.cable_count)))
-
-
-def chart_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, ...]:
-    """The tension limits. If cables have different limits, the tightest limits."""
-    low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
+def tension_chart(title: str, robot: Robot, tension: Array, at: str = "frame_end") -> Chart:
+    """Chart of tensions (N, m) [N] of the part `at` of the cables, with the tightest limits of all cables."""
+    unit, low, high = force_unit(robot), float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
-    lower = ((low / newtons, f"lowest allowed{other}", False),) if low > 0.0 else ()
-    upper = ((high / newtons, f"highest allowed{other}", True),) if isfinite(high) else ()
-    return lower + upper
+    lower = ((low / unit.newtons, f"lowest allowed{other}", False),) if low > 0.0 else ()
+    upper = ((high / unit.newtons, f"highest allowed{other}", True),) if isfinite(high) else ()
+    names = tuple(map(str, range(robot.cable_count)))
+    return Chart(title, unit.name, unit.decimals, names, lambda rows: tension[rows] / unit.newtons, lower + upper)
 
 
 MOST_SPANS: Final = 400  # largest number of spans on a timeline; close ones are joined
 
 
-def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:
+def spans_of(time: Array, wrong: Flags, why: Callable[[slice], str]) -> tuple[Span, ...]:
     """Spans of consecutive samples with the flag `wrong`. A sample lasts until the next sample."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], wrong, [False])).astype(np.int8))).reshape(-1, 2)
+    edges = true_runs(wrong)
     if not edges.size:
         return ()
     until = np.minimum(edges[:, 1], time.size - 1)
@@ -102,8 +98,9 @@ def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str])
     )
 
 
-def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ...]:
+def infeasible_spans(plan: Plan, time: Array) -> tuple[Span, ...]:
     """Time spans in which a plan of N poses is not feasible or not stable."""
+    unit = force_unit(plan.state.one_robot)
 
     def why(rows: slice) -> str:
         lost = plan.status[rows] == PoseStatus.INFEASIBLE
@@ -123,9 +120,9 @@ def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ..
     return spans_of(time, ~plan.solved, why)
 
 
-def limit_violations(robot: Robot, time: Array, tension: Array, unit: ForceUnit) -> tuple[Span, ...]:
+def limit_violations(robot: Robot, time: Array, tension: Array) -> tuple[Span, ...]:
     """Spans in which a tension at the winch, shape (N, m) [N], is not within its limits."""
-    below = np.asarray(tension < robot.tension_min)  # NaN is neither above nor below a limit
+    unit, below = force_unit(robot), np.asarray(tension < robot.tension_min)  # NaN is neither above nor below a limit
     above = np.asarray(tension > robot.tension_max)
 
     def why(rows: slice) -> str:

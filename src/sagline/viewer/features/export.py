@@ -88,8 +88,7 @@ def _camera_of(client: viser.ClientHandle) -> Camera:
 
 def _seen(camera: Camera, low: Array, high: Array) -> tuple[float, float, float, float]:
     """Visible extents of a box, horizontal and vertical [slope], its distance, and the advance of the camera [m]."""
-    corners, edge = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T, camera.reach
-    place = (corners - camera.place) @ camera.axes
+    place, edge = (shapes.box_corners(low, high) - camera.place) @ camera.axes, camera.reach
     depth = place[:, 2]
     far, forward = float(depth.mean()), max(0.0, float(depth.max()) - DEEPEST)
     if depth.min() <= forward:  # part of the box is behind the camera
