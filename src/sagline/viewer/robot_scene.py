@@ -221,11 +221,6 @@ class RobotScene:
         self._platform.wxyz = np.roll((back * pose.rotation).as_quat(), 1)
         self._cables.points = shapes.segments(courses, dashed=False).astype(np.float32)
 
-    def settle(self) -> None:
-        """Move the platform back to the pose of its gizmo."""
-        self._platform.position = np.zeros(3)
-        self._platform.wxyz = np.array([1.0, 0.0, 0.0, 0.0])
-
     def show_traces(self, wanted: Array, actual: Array) -> None:
         """Draw the desired and the actual path (n, 3) instead of the previous paths; NaN is a gap."""
         for name, points, color in (("/wanted", wanted, WANTED), ("/actual", actual, ACTUAL)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
@@ -52,17 +52,24 @@ class PlayedLog(Played):
     length: Array  # lengths from the encoders, with the zeros of homing [m], shape (N, m)
     set_length: Array  # set points of the lengths [m], shape (N, m)
     events: tuple[Event, ...]
+    shown: Array = field(init=False)  # index of the last cycle with a known position up to each cycle, or of the first
 
     name = "log"
     unchanged = "A log keeps its robot and loads; drag the platform to change them."
+
+    def __post_init__(self) -> None:
+        """Determine, for each cycle with an unknown position, the cycle whose position is shown instead."""
+        known = np.flatnonzero(np.isfinite(self.position[:, 0]))
+        last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
+        rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
+        object.__setattr__(self, "shown", rows)
 
     def pose_at(self, index: int) -> Pose:
         """Planned pose of the cycle `index`. Without a plan, its estimated pose, or the last known pose."""
         if np.isfinite(self.planned[index]).all():
             return Pose.from_quaternion(self.planned[index], self.planned_quaternion[index])
-        known = np.flatnonzero(np.isfinite(self.position[:, 0]))
-        if known.size:
-            row = known[max(int(np.searchsorted(known, index, side="right")) - 1, 0)]
+        row = int(self.shown[index])
+        if row >= 0:
             return Pose.from_quaternion(self.position[row], self.quaternion[row])
         box, anchors = self.robot.test_box, self.robot.frame_anchors
         return Pose(anchors.mean(axis=0) if box is None else 0.5 * (box.low + box.high), np.eye(3))
