@@ -10,7 +10,7 @@ import pytest
 import sagline as sl
 from sagline.calibration.findings import Direction
 from sagline.calibration.identifiability import append_rows, gauge_of, numerical_rank
-from sagline.calibration.observations import predicted_rows
+from sagline.calibration.observations import machine_of, predicted_rows
 from sagline.calibration.parameters import KINDS, Parameters, prior_units
 from sagline.core.arrays import Array
 from tests.calibration import reference
@@ -179,7 +179,9 @@ def triangle_of(case: Case) -> Array:
     for part, given in ((slice(0, case.positions), sensors), (slice(case.positions, None), None)):
         read = given or (sensors if case.positions in (0, POSES) else sensors.replace(position_deviation=None))
         if len(lengths[part]):
-            rows = predicted_rows(machine.robot, sl.Catenary(), parameters, read, pose_rows(pose[part]), lengths[part])
+            rows = predicted_rows(
+                machine_of(machine.robot, sl.Catenary(), parameters, read), pose_rows(pose[part]), lengths[part]
+            )
             triangle = append_rows(triangle, rows.matrix)
     return triangle
 

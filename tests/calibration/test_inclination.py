@@ -39,7 +39,9 @@ def test_slopes_are_rotations_about_the_horizontal_axes_of_the_world() -> None:
     level = machine.sensors.replace(rotation_deviation=[2e-3, 3e-3, np.inf])
     for kind, row in COLUMNS:
         asked = reference.parameters(machine, (kind,))
-        seen = predicted_rows(machine.robot, sl.Catenary(), asked, level, reference.pose_rows(pose), lengths)
+        seen = predicted_rows(
+            machine_of(machine.robot, sl.Catenary(), asked, level), reference.pose_rows(pose), lengths
+        )
         found = seen.matrix[:, -3:, asked.where[row, 0]] * [2e-3, 3e-3, 1.0]
         turned = reference.slopes(machine, pose, lengths, row, 0)[:, -3:] @ machine.sensors.frame.matrix.T
         wanted = 0.0 * turned if kind == "measuring_frame" else turned * [1.0, 1.0, 0.0]

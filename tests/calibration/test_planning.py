@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.calibration import planning
-from sagline.calibration.observations import predicted_rows
+from sagline.calibration.observations import machine_of, predicted_rows
 from sagline.calibration.parameters import KINDS, parameters_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
@@ -38,7 +38,9 @@ def information_of(plan: sl.CalibrationPoses, pose: sl.Pose, lengths: Array) -> 
     """Information of poses on the parameters of a plan, in units of the priors, (P, P)."""
     numbers = plan.parameters
     unit = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
-    matrix = predicted_rows(plan.robot, sl.Catenary(), numbers, plan.sensors, pose_rows(pose), lengths).matrix
+    matrix = predicted_rows(
+        machine_of(plan.robot, sl.Catenary(), numbers, plan.sensors), pose_rows(pose), lengths
+    ).matrix
     flat = (matrix * unit).reshape(-1, len(unit))
     found: Array = flat.T @ flat
     return found
@@ -326,7 +328,10 @@ def _errors_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown]) -> Array:
     unit = np.where(numbers.logarithmic, numbers.prior, 1.0)
     rows = pose_rows(plan.poses)
     matrix = (
-        predicted_rows(plan.robot, sl.Catenary(), numbers, plan.sensors, rows, plan.unstrained_length).matrix / unit
+        predicted_rows(
+            machine_of(plan.robot, sl.Catenary(), numbers, plan.sensors), rows, plan.unstrained_length
+        ).matrix
+        / unit
     )
     flat = matrix.reshape(-1, len(unit))
     errors: Array = np.sqrt(np.diag(np.linalg.inv(np.diag(numbers.prior_deviation**-2.0) + flat.T @ flat)))

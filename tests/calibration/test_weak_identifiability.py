@@ -9,7 +9,7 @@ import pytest
 import sagline as sl
 from sagline.calibration.findings import Direction
 from sagline.calibration.identifiability import append_rows, gauge_of
-from sagline.calibration.observations import predicted_rows
+from sagline.calibration.observations import machine_of, predicted_rows
 from sagline.calibration.parameters import Parameters, prior_units
 from sagline.calibration.weak_identifiability import weak_directions
 from sagline.core.arrays import Array
@@ -33,7 +33,9 @@ def identified(robot: str, unknowns: tuple[str, ...], *, positions: bool = False
     sensors = sl.Sensors(5e-4, 5.0, 1e-3 if positions else None)
     shared = tuple(name for name in unknowns if name in ("pulley_radius", "axial_stiffness", "linear_density"))
     parameters = reference.parameters(machine, unknowns, shared=shared)
-    matrix = predicted_rows(machine.robot, sl.Catenary(), parameters, sensors, pose_rows(pose), lengths).matrix
+    matrix = predicted_rows(
+        machine_of(machine.robot, sl.Catenary(), parameters, sensors), pose_rows(pose), lengths
+    ).matrix
     triangle = append_rows(np.zeros((0, len(parameters.names))), matrix)
     gauge = gauge_of(triangle, parameters, parameters.prior, machine.robot, sensors)
     rows = matrix.reshape(-1, matrix.shape[2]) * prior_units(parameters).scale

@@ -14,7 +14,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors, count_of_frequencies, reading_deviations
 from sagline.calibration.observations import machine_of, unwhitened_slopes, winch_slopes
-from sagline.calibration.parameters import Parameters, internal, prior_root, prior_units, slopes_of_values, values_in
+from sagline.calibration.parameters import Parameters, internal, prior_root, prior_units, values_in
 from sagline.calibration.straight import whitened_errors
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.indices import evenly_spaced
@@ -276,10 +276,11 @@ def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Arra
         return rows * scale, noise, misfit + rows * scale @ step, root
     residuals = found.residuals[used]
     modes = count_of_frequencies(found.sensors, m, residuals.shape[1])
-    at = pose_rows(found.poses)[used], lengths, 0.0, 1.0, residuals[:, residuals.shape[1] - modes :] if modes else None
-    by_values, by_length = unwhitened_slopes(found.robot, found.model, parameters, found.sensors, *at)
+    machine = machine_of(found.robot, found.model, parameters, found.sensors)
+    frequencies = residuals[:, residuals.shape[1] - modes :] if modes else None
+    by_values, by_length = unwhitened_slopes(machine, pose_rows(found.poses)[used], lengths, frequencies)
     read = ~np.isnan(residuals[:, m:])
-    slopes = by_values * slopes_of_values(found.robot, parameters) * scale * read[..., None]
+    slopes = by_values * machine.slopes * scale * read[..., None]
     noise = np.concatenate((by_length, np.broadcast_to(np.eye(read.shape[1]), (*read.shape, read.shape[1]))), axis=2)
     noise = noise * np.where(np.isfinite(stated), stated, 0.0) * read[..., None]
     misfit = np.where(read, residuals[:, m:] - np.einsum("nij,nj->ni", by_length, residuals[:, :m]), 0.0)

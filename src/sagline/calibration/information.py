@@ -7,14 +7,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.cables.model import CableModel
 from sagline.calibration.candidates import CandidatePoses
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import predicted_rows
-from sagline.calibration.parameters import Parameters
+from sagline.calibration.observations import MachineTerms, predicted_rows, with_sensors
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import n
-from sagline.robot.robot import Robot
 
 FEW: Final = 8  # readings per parameter; with more readings, exchanges of poses would reduce errors by less than 1 %
 OPEN: Final = 1e-12  # a direction is unobservable if its singular value is below this share of the largest
@@ -155,12 +152,8 @@ Option = tuple[str, Array]  # text of an additional measurement, and the informa
 class Situation(NamedTuple):
     """Calibration poses and the information about the parameters from measurements at these poses."""
 
-    robot: Robot
-    model: CableModel
-    parameters: Parameters
-    sensors: Sensors
+    machine: MachineTerms  # the robot, the unknowns and the sensors
     scale: Array  # unit of each internal parameter, shape (P,)
-    slopes: Array  # derivatives of the values with respect to the internal parameters, shape (P,)
     known: Array  # prior information, shape (P, P); small for a parameter without a prior
     standing: CandidatePoses  # the chosen poses
     rows: Array  # whitened slopes of the readings, in units of `scale`, shape (N, k, P)
@@ -173,8 +166,7 @@ class Situation(NamedTuple):
     def rows_by(self, sensors: Sensors) -> Array:
         """Whitened slopes (N, m + 6, P) that the sensors `sensors` would have at the poses, in units of `scale`."""
         poses, lengths = self.standing.poses, self.standing.lengths
-        found = predicted_rows(self.robot, self.model, self.parameters, sensors, poses, lengths)
-        return np.asarray(found.matrix * self.scale)
+        return np.asarray(predicted_rows(with_sensors(self.machine, sensors), poses, lengths).matrix * self.scale)
 
 
 def most_helpful(situation: Situation) -> str:
@@ -196,13 +188,13 @@ def most_helpful(situation: Situation) -> str:
 
 def _options(situation: Situation) -> Iterator[Option]:
     """Possible additional measurements, with the information after each measurement."""
-    parameters, sensors = situation.parameters, situation.sensors
+    parameters, sensors = situation.machine.parameters, situation.machine.sensors
     for name, (words, deviation, is_share) in TOOLS.items():
         if name in parameters.names:
             mine = np.flatnonzero([other == name for other in parameters.names])
             size = parameters.prior[mine] if is_share else np.ones(len(mine))
             gain = np.zeros(len(situation.scale))
-            gain[mine] = (situation.scale[mine] * situation.slopes[mine] / (deviation * size)) ** 2
+            gain[mine] = (situation.scale[mine] * situation.machine.slopes[mine] / (deviation * size)) ** 2
             yield words, situation.information + np.diag(gain)
     if sensors.tension_deviation is None:
         deviation = typical_load_cell_deviation(situation.standing.tensions)
@@ -216,8 +208,8 @@ def _options(situation: Situation) -> Iterator[Option]:
 
 def _measured_anchors(situation: Situation) -> Iterator[Option]:
     """Options to measure one frame anchor or three frame anchors."""
-    names, cables = np.array(situation.parameters.names), situation.parameters.cables
-    m = situation.robot.cable_count
+    names, cables = np.array(situation.machine.parameters.names), situation.machine.parameters.cables
+    m = situation.machine.robot.cable_count
     rows = np.zeros((m, 3, len(names)))
     for cable in range(m):
         where = np.flatnonzero((names == "frame_anchors") & (cables == cable))
@@ -227,7 +219,7 @@ def _measured_anchors(situation: Situation) -> Iterator[Option]:
 
 def _measured_positions(situation: Situation) -> Iterator[Option]:
     """Options to measure the position of the platform at three or six of the poses."""
-    sensors = situation.sensors.replace(position_deviation=TOTAL_STATION)
+    sensors = situation.machine.sensors.replace(position_deviation=TOTAL_STATION)
     alone = situation.rows_by(sensors.replace(tension_deviation=None, rotation_deviation=None))
     words = dict.fromkeys((3, 6), "the position at poses {} measured")
     yield from _best_subset(situation, alone, situation.rows_by(sensors), words, situation.rows)
@@ -257,11 +249,11 @@ def _deviations(known: Array) -> Array:
 
 def _largest_reduction(situation: Situation, before: Array, after: Array) -> str:
     """Text about the kind of parameter with the largest reduction of errors."""
-    names = np.array(situation.parameters.names)
+    names = np.array(situation.machine.parameters.names)
     name = min(dict.fromkeys(names), key=lambda name: float(np.log(after / before)[names == name].mean()))
     mine = names == name
-    unit = situation.parameters.units[int(np.argmax(mine))]
-    size = situation.scale * np.abs(situation.slopes)
+    unit = situation.machine.parameters.units[int(np.argmax(mine))]
+    size = situation.scale * np.abs(situation.machine.slopes)
     one, other = (error_text(float(np.sqrt(np.mean((each * size)[mine] ** 2))), unit) for each in (before, after))
     return f"the errors of {name} fall from {one} to {other}"
 

@@ -158,6 +158,21 @@ def with_parameters(machine: MachineTerms, parameters: Parameters) -> MachineTer
     return machine._replace(parameters=parameters, terms=terms, slopes=slopes_of_values(machine.robot, parameters))
 
 
+def with_sensors(machine: MachineTerms, sensors: Sensors) -> MachineTerms:
+    """The machine with other sensors."""
+    return machine._replace(sensors=sensors, sensing=_sensor_arrays(machine.robot, sensors))
+
+
+def with_unit_sensors(machine: MachineTerms) -> MachineTerms:
+    """The machine with exact lengths, and other sensors of the same kinds with standard deviations of 1 in SI units."""
+    sensors = machine.sensors
+    rotation = [1.0, 1.0, 1.0 if sensors.rotation_deviation is None or measures_yaw(sensors) else np.inf]
+    more = [None if deviation is None else 1.0 for deviation in (sensors.swivel_deviation, sensors.frequency_deviation)]
+    further = {"swivel_deviation": more[0], "frequency_deviation": more[1]}
+    exact = Sensors(EXACT, 1.0, 1.0, rotation, **further, frame=sensors.frame, target=sensors.target)
+    return with_sensors(machine, exact)
+
+
 def winch_slopes(machine: MachineTerms, lengths: Array, counts: Array | None = None) -> Array:
     """Derivatives of reported lengths (N, m) [m] by the unknowns of `SLOPES`, (5, N, m); zero for clock_offset.
 
@@ -206,11 +221,9 @@ def whitened_rows(
     along this direction are computed, so that P is 1 in the result.
     """
     found = _observed(machine, readings, slopes, poses, lengths, direction)
-    return (
-        found
-        if further is None
-        else _with_further(machine, readings, slopes, poses, lengths, direction, further, found)
-    )
+    if further is None:
+        return found
+    return _with_further(machine, readings, slopes, poses, lengths, direction, further, found)
 
 
 def _with_further(
@@ -227,8 +240,8 @@ def _with_further(
     m, sensors, where = lengths.shape[1], machine.sensors, machine.parameters.where.copy()
     where[kinds.SHIFT : kinds.SCALE] = -1  # the measuring system does not move the platform
     parameters = replace(machine.parameters, where=locked(where))
-    plain = machine._replace(sensors=POSE_SENSORS, sensing=_sensor_arrays(machine.robot, POSE_SENSORS))
-    moves = _observed(plain._replace(parameters=parameters), _no_readings(lengths), slopes, poses, lengths, direction)
+    plain = with_sensors(machine, POSE_SENSORS)._replace(parameters=parameters)
+    moves = _observed(plain, _no_readings(lengths), slopes, poses, lengths, direction)
     motion = moves.matrix[:, m:], np.swapaxes(moves.back, 1, 2)[:, m:] / EXACT**2
     factor = machine.slopes if direction is None else machine.slopes * direction
     scale, places = np.where(where >= 0, factor[where], 0.0), where if direction is None else np.minimum(where, 0)
@@ -306,58 +319,32 @@ def _observed(
 
 
 def predicted_rows(
-    robot: Robot,
-    model: CableModel,
-    parameters: Parameters,
-    sensors: Sensors,
-    poses: Array,
-    lengths: Array,
-    offset: Array | float = 0.0,
-    scale: Array | float = 1.0,
-    frequencies: Array | None = None,
+    machine: MachineTerms, poses: Array, lengths: Array, frequencies: Array | None = None
 ) -> WhitenedRows:
     """Whitened slopes of the readings at equilibria with pose rows `poses` and unstrained lengths (N, m) [m].
 
-    offset [m], scale: of the reported lengths, each (m,) or one number. frequencies: (N, K), NaN where no slopes are
-    wanted, or None.
+    frequencies: (N, K), NaN where no slopes are wanted, or None.
     """
-    machine = machine_of(robot, model, parameters, sensors, offset, scale)
-    more = sensors.swivel_deviation is not None or frequencies is not None
+    more = machine.sensors.swivel_deviation is not None or frequencies is not None
     further = FurtherReadings(None, frequencies) if more else None
     slopes, readings = winch_slopes(machine, lengths), _no_readings(lengths)
     rows = whitened_rows(machine, readings, slopes, poses, lengths, further=further)
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
 
-def unit_sensors(sensors: Sensors) -> Sensors:
-    """Sensors for all readings, each with a standard deviation of 1 in SI units, and with exact lengths."""
-    rotation = [1.0, 1.0, 1.0 if sensors.rotation_deviation is None or measures_yaw(sensors) else np.inf]
-    more = [None if deviation is None else 1.0 for deviation in (sensors.swivel_deviation, sensors.frequency_deviation)]
-    further = {"swivel_deviation": more[0], "frequency_deviation": more[1]}
-    return Sensors(EXACT, 1.0, 1.0, rotation, **further, frame=sensors.frame, target=sensors.target)
-
-
 def unwhitened_slopes(
-    robot: Robot,
-    model: CableModel,
-    parameters: Parameters,
-    sensors: Sensors,
-    poses: Array,
-    lengths: Array,
-    offset: Array | float = 0.0,
-    scale: Array | float = 1.0,
-    frequencies: Array | None = None,
+    machine: MachineTerms, poses: Array, lengths: Array, frequencies: Array | None = None
 ) -> tuple[Array, Array]:
     """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths.
 
     The derivatives of swivel angles follow in m more rows, then those of frequencies (N, K), if given.
     """
-    (count, m), sensors = lengths.shape, unit_sensors(sensors)
-    width = len(reading_deviations(sensors, m, 0 if frequencies is None else frequencies.shape[1])) - m
-    by_values, by_length = np.empty((count, width, len(parameters.names))), np.empty((count, width, m))
+    (count, m), machine = lengths.shape, with_unit_sensors(machine)
+    width = len(reading_deviations(machine.sensors, m, 0 if frequencies is None else frequencies.shape[1])) - m
+    by_values, by_length = np.empty((count, width, len(machine.slopes))), np.empty((count, width, m))
     for part in blocks(count, BLOCK):
-        at = poses[part], lengths[part], offset, scale, None if frequencies is None else frequencies[part]
-        rows = predicted_rows(robot, model, parameters, sensors, *at)
-        by_values[part] = rows.matrix / slopes_of_values(robot, parameters)
+        some = None if frequencies is None else frequencies[part]
+        rows = predicted_rows(machine, poses[part], lengths[part], some)
+        by_values[part] = rows.matrix / machine.slopes
         by_length[part] = np.swapaxes(rows.back, 1, 2) / EXACT**2
     return by_values, by_length

@@ -192,9 +192,8 @@ def outliers_in(
     deviation = reading_deviations(machine.sensors, m, modes)
     more = [read for read in (log.swivels, log.frequencies) if read is not None]
     read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3], *more))) & np.isfinite(deviation[m:])
-    exact = observations.unit_sensors(machine.sensors)
-    parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), exact, counted=False)  # not used
-    exactly = observations.machine_of(machine.robot, problem.model, parameters, exact, swivel_zero=machine.swivel_zero)
+    parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), machine.sensors, counted=False)
+    exactly = observations.with_unit_sensors(observations.with_parameters(machine, parameters))  # no slopes are used
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)

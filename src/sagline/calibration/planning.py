@@ -13,7 +13,7 @@ from sagline.cables.models import Catenary
 from sagline.calibration import information
 from sagline.calibration.candidates import CandidatePoses, candidates_of, shortest_tour, tour_length
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import has_drum_data, predicted_rows
+from sagline.calibration.observations import has_drum_data, machine_of, predicted_rows
 from sagline.calibration.parameters import (
     DEFAULT,
     KINDS,
@@ -21,7 +21,6 @@ from sagline.calibration.parameters import (
     Unknown,
     parameters_of,
     prior_root,
-    slopes_of_values,
 )
 from sagline.core.arguments import callback, instance, optional, whole_number
 from sagline.core.arrays import Array, Flags, Indices, locked
@@ -250,13 +249,13 @@ def calibration_poses(
         8.0 * 3.0 * tried * (robot.cable_count + 6) * len(parameters.names),
         "Ask for fewer candidates.",
     )
-    slopes = slopes_of_values(robot, parameters)
-    scale, held = _scale(parameters, slopes)
-    rows = predicted_rows(robot, _CATENARY, parameters, read, standing.poses, standing.lengths).matrix * scale
+    machine = machine_of(robot, _CATENARY, parameters, read)
+    scale, held = _scale(parameters, machine.slopes)
+    rows = predicted_rows(machine, standing.poses, standing.lengths).matrix * scale
     stable = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))
     standing, rows = standing.part(stable), _read(rows[stable])
     _refuse(robot, parameters, size, tried, rows)
-    root, unit = prior_root(parameters), scale * np.abs(slopes)
+    root, unit = prior_root(parameters), scale * np.abs(machine.slopes)
     known = information.prior_information(rows, root)
     chosen, gain, deviation = information.choose_informative(rows, known, size)
     order = chosen[_driving_order(standing.part(chosen))]
@@ -275,9 +274,7 @@ def calibration_poses(
         share_of_random=_share(known, own, random),
         gain=locked(gain),
         enough=_sufficient_count(deviation),
-        most_helpful=information.most_helpful(
-            information.Situation(robot, _CATENARY, parameters, read, scale, slopes, known, poses, own)
-        ),
+        most_helpful=information.most_helpful(information.Situation(machine, scale, known, poses, own)),
     )
 
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.model import CableModel
 from sagline.calibration import findings, summary
 from sagline.calibration.findings import Findings, SensorDeviation
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import machine_of, unwhitened_slopes, winch_slopes
-from sagline.calibration.parameters import Parameters, values_in
+from sagline.calibration.observations import MachineTerms, machine_of, unwhitened_slopes, winch_slopes
+from sagline.calibration.parameters import values_in
 from sagline.calibration.straight import slopes_of_poses
 from sagline.core.arguments import choice, flag
 from sagline.core.arrays import Array, locked, numbers
@@ -25,7 +24,6 @@ from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_rows import ForwardSolution
 from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose, PoseLike, pose_of
-from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
 
 
@@ -87,24 +85,14 @@ _WITHOUT_MOTION = (
 )
 
 
-def motion_slopes(
-    robot: Robot,
-    model: CableModel,
-    parameters: Parameters,
-    poses: Array,
-    lengths: Array,
-    offset: Array | float = 0.0,
-    scale: Array | float = 1.0,
-) -> tuple[Array, Array]:
+def motion_slopes(machine: MachineTerms, poses: Array, lengths: Array) -> tuple[Array, Array]:
     """Derivatives of the pose (origin, rotation vector) [m, rad]: (N, 6, P) by values and (N, 6, m) by lengths."""
-    m = robot.cable_count
-    if model.code == codes.STRAIGHT:
-        machine = machine_of(robot, model, parameters, Sensors(), offset, scale)
+    if machine.model.code == codes.STRAIGHT:
         by_values, by_length = slopes_of_poses(machine, winch_slopes(machine, lengths), poses)
         by_values = by_values / machine.slopes
-        return np.where(np.isin(parameters.names, _WITHOUT_MOTION), 0.0, by_values), by_length
-    by_values, by_length = unwhitened_slopes(robot, model, parameters, Sensors(), poses, lengths, offset, scale)
-    return np.where(np.isin(parameters.names, _WITHOUT_MOTION), 0.0, by_values[:, m:]), by_length[:, m:]
+    else:
+        by_values, by_length = (slopes[:, lengths.shape[1] :] for slopes in unwhitened_slopes(machine, poses, lengths))
+    return np.where(np.isin(machine.parameters.names, _WITHOUT_MOTION), 0.0, by_values), by_length
 
 
 def _common_motions(poses: Array) -> Array:
@@ -248,7 +236,8 @@ class Calibration(Findings, Saved):
 
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
         reported = self.length_offset, self.length_scale
-        return motion_slopes(self.robot, self.model, self.parameters, poses, lengths, *reported)
+        machine = machine_of(self.robot, self.model, self.parameters, Sensors(), *reported)
+        return motion_slopes(machine, poses, lengths)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:
         """Covariance (N, 6, 6) of origin and rotation vector, due to errors of the values and of the winch lengths."""
