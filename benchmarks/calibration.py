@@ -13,7 +13,7 @@ import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
 from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import best_step, evaluate_step
-from sagline.calibration.parameters import external, parameters_of, with_values
+from sagline.calibration.parameters import parameters_of, with_values
 from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, readings_table, start_of
 from sagline.core.arrays import Array
 from sagline.robot.drum import drums_of
@@ -48,15 +48,15 @@ def plain_seconds(log: sl.WinchLog) -> float:
 
     def misses(x: Array) -> Array:
         numbers, lengths = x[:width], x[width:].reshape(state.lengths.shape)
-        robot = with_values(COGIRO, problem.parameters, external(problem.parameters, numbers))
+        robot = with_values(COGIRO, problem.parameters, problem.parameters.external(numbers))
         drums = drums_of(robot)
         said = drums.lengths_at(log.readings) / (1.0 + drums.rest_strain)
         found = sl.forward(robot, lengths, log.commanded)
         cells = (read - found.state.cables.frame_end_tension) / deviation
-        prior = (numbers - problem.prior) / problem.prior_deviation
+        prior = (numbers - problem.prior) / problem.parameters.internal_deviation
         return np.concatenate((cells.ravel(), ((lengths - said) / log.sensors.length_deviation).ravel(), prior))
 
-    scale = np.concatenate((problem.prior_deviation, np.full(state.lengths.size, 1e-3)))
+    scale = np.concatenate((problem.parameters.internal_deviation, np.full(state.lengths.size, 1e-3)))
     begin = np.concatenate((problem.prior, state.lengths.ravel()))
     begun = time.process_time()
     least_squares(misses, begin, x_scale=scale, ftol=1e-6, max_nfev=12)

@@ -8,7 +8,7 @@ import sagline as sl
 from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import evaluate_step, predict_state, solve
 from sagline.calibration.log import load_cells_of
-from sagline.calibration.parameters import external, parameters_of, with_values
+from sagline.calibration.parameters import parameters_of, with_values
 from sagline.calibration.problem import Fit, FitProblem, ReadingsTable, SearchState, readings_table, start_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
@@ -35,7 +35,7 @@ def fitted(problem: FitProblem, made: Synthetic, *, robust: bool = False) -> Fit
 
 def errors_of(problem: FitProblem, fit: Fit) -> Array:
     """Standard errors of the internal parameters, (P,)."""
-    information = fit.normal.matrix + np.diag(problem.prior_deviation**-2.0)
+    information = fit.normal.matrix + np.diag(problem.parameters.internal_deviation**-2.0)
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
 
@@ -50,7 +50,7 @@ def plain_fit(problem: FitProblem, made: Synthetic, fit: Fit) -> Array:
 
     def misses(x: Array) -> Array:
         numbers, lengths = x[:width], x[width:].reshape(cells.shape)
-        robot = with_values(problem.robot, problem.parameters, external(problem.parameters, numbers))
+        robot = with_values(problem.robot, problem.parameters, problem.parameters.external(numbers))
         said = sl.lengths_from_counts(robot, counts)
         found = sl.forward(robot, lengths, poses)
         assert found.solved.all()
@@ -58,11 +58,11 @@ def plain_fit(problem: FitProblem, made: Synthetic, fit: Fit) -> Array:
             (
                 ((cells - found.state.cables.frame_end_tension) / tension).ravel(),
                 ((lengths - said) / sensors.length_deviation).ravel(),
-                (numbers - problem.prior) / problem.prior_deviation,
+                (numbers - problem.prior) / problem.parameters.internal_deviation,
             )
         )
 
-    scale = np.concatenate((problem.prior_deviation, np.full(cells.size, 1e-3)))
+    scale = np.concatenate((problem.parameters.internal_deviation, np.full(cells.size, 1e-3)))
     begin = np.concatenate((fit.state.numbers + 1e-4 * scale[:width], fit.state.lengths.ravel()))
     answer = least_squares(misses, begin, jac="3-point", x_scale=scale, xtol=1e-14, ftol=1e-14, gtol=1e-14)
     found: Array = answer.x
@@ -97,7 +97,7 @@ def test_parameters_respect_lower_bounds_and_the_others_are_optimal() -> None:
     at_least = numbers == 0.0
     assert 0 < at_least.sum() < len(numbers)
     assert numbers.min() == 0.0
-    downhill = fit.normal.gradient - (numbers - problem.prior) / problem.prior_deviation**2
+    downhill = fit.normal.gradient - (numbers - problem.prior) / problem.parameters.internal_deviation**2
     assert (downhill[at_least] < 0.0).all()
     assert np.abs(downhill[~at_least] * errors_of(problem, fit)[~at_least]).max() < 0.01
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.calibration.observations import machine_of
-from sagline.calibration.parameters import offset_with, parameters_of, with_values
+from sagline.calibration.parameters import parameters_of, with_values
 from sagline.calibration.result import motion_slopes
 from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of, pose_rows
@@ -63,7 +63,7 @@ def drawn(name: str, believed: Array, start: sl.Pose, rng: np.random.Generator) 
         if counted:
             lengths.append(sl.lengths_from_counts(robot, believed) + noise)
         else:
-            lengths.append(believed + offset_with(calibration.robot, parameters, value) + noise)
+            lengths.append(believed + calibration.parameters.length_offset(value) + noise)
         robots.append(robot)
     starts = sl.Pose(np.tile(start.position, (DRAWS, 1)), np.tile(start.matrix, (DRAWS, 1, 1)))
     solution = sl.forward(robots, np.array(lengths), starts)
@@ -108,7 +108,7 @@ def test_common_errors_of_the_poses_of_the_log() -> None:
     left, turns = [], []
     for value in values:
         robot = with_values(calibration.robot, calibration.parameters, value)
-        more = offset_with(calibration.robot, calibration.parameters, value) - offset
+        more = calibration.parameters.length_offset(value) - offset
         moved = sl.forward(robot, lengths + more, poses).pose.position - poses.position
         there = sl.forward(robot, wanted + more + 5e-4 * rng.normal(size=8), pose).pose
         here = there.position - pose.position

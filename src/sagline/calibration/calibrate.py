@@ -22,7 +22,6 @@ from sagline.calibration.parameters import (
     Parameters,
     Unknown,
     checked_unknowns,
-    internal,
     parameters_of,
 )
 from sagline.calibration.problem import (
@@ -152,7 +151,7 @@ def calibrate(
     except InvalidValueError:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
         raise
-    departure = float(np.abs(problem.missed(fit.state.numbers)).max())
+    departure = float(np.abs(problem.parameters.missed(fit.state.numbers)).max())
     few = len(fit_log) < FEW_KEPT * len(log)
     if few or not fit.converged or misfit(fit.normal) > diagnostics.GOOD or departure > diagnostics.STRANGE:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
@@ -221,7 +220,7 @@ def _geometric_start(
     asked = [one for one in unknowns if one.name not in (*OF_FORCES, "swivel_zero", "inertia")]
     try:
         found = calibrate(problem.robot, log, asked, model=Straight(), folds=0)
-        at = dict(zip(found.parameters.labels, internal(found.parameters, found.values), strict=True))
+        at = dict(zip(found.parameters.labels, found.parameters.internal(found.values), strict=True))
         numbers = np.array([at.get(*pair) for pair in zip(problem.parameters.labels, problem.prior, strict=True)])
         machine = problem.machine_at(numbers)
     except InvalidValueError:

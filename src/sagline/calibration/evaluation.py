@@ -16,7 +16,7 @@ from sagline.calibration.identifiability import OPEN, append_rows, gauge_of
 from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_at
 from sagline.calibration.observations import BLOCK, with_parameters
 from sagline.calibration.outliers import misfitting, outliers_in
-from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, external, parameters_of, quantities_of
+from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, parameters_of
 from sagline.calibration.problem import Fit, FitProblem
 from sagline.calibration.result import Calibration
 from sagline.calibration.weak_identifiability import weak_directions
@@ -52,14 +52,15 @@ def calibration_of(
     wider, count = _with_fixed_parameters(problem, unknowns), len(numbers)
     residuals, factor = _last_readings(problem, wider, fit)
     triangle = factor[:count, :count]
-    values = external(parameters, numbers)
+    values = parameters.external(numbers)
     gauge = gauge_of(triangle, parameters, values, machine.robot, machine.sensors)
     covariance, rank = covariance_of(problem, triangle, machine.slopes)
     criticisms: tuple[Criticism, ...] = ()
     if len(wider.parameters.names) > count:
         considered, criticisms = _criticism(problem, wider, fit, factor, covariance)
         covariance = covariance + considered
-    whole, missed = kept & (normal.weights == 1.0), problem.missed(numbers)
+    whole, missed = kept & (normal.weights == 1.0), parameters.missed(numbers)
+    known = np.count_nonzero(np.isfinite(parameters.internal_deviation))
     bad = misfitting(np.where(kept, normal.squares, np.nan), normal.readings)
     poses, date = fit.state.poses[kept], datetime.now(UTC).date().isoformat()
     result = Calibration(
@@ -72,7 +73,7 @@ def calibration_of(
         values=locked(values),
         covariance=locked(covariance),
         chi_squared=float(normal.squares[whole].sum() + missed @ missed),
-        degrees_of_freedom=int(normal.readings[whole].sum()) + int(np.isfinite(problem.prior_deviation).sum()) - rank,
+        degrees_of_freedom=int(normal.readings[whole].sum() + known) - rank,
         rows=locked(rows[kept]),
         left_out=left_out,
         poses=Pose._adopt(locked(poses[:, :3].copy()), locked(poses[:, 3:].copy())),
@@ -114,7 +115,7 @@ def _status(fit: Fit, kept: Flags, result: Calibration) -> CalibrationStatus:
 def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:
     """Covariance (P, P) of the values, and its rank; the variance of an unobserved value without prior is infinite."""
     scale = problem.scale
-    _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, problem.prior_root * scale))
+    _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, problem.parameters.prior_root * scale))
     observable = sizes > OPEN * sizes[0]
     unit = rows[: len(observable)][observable].T / sizes[observable] * (scale * slopes)[:, None]
     covariance: Array = unit @ unit.T
@@ -145,7 +146,7 @@ def provenance_of(
 ) -> Provenance:
     """Provenance of a calibrated robot with log, date (ISO 8601) and the standard errors (P,) of the values."""
     note = "" if status is CalibrationStatus.FOUND else status.text
-    return Provenance(log, date, quantities_of(parameters, standard_error), note)
+    return Provenance(log, date, parameters.by_quantity(standard_error), note)
 
 
 def _with_fixed_parameters(problem: FitProblem, unknowns: Sequence[Unknown]) -> FitProblem:
@@ -201,8 +202,8 @@ def _criticism(
     """
     count, parameters = len(problem.parameters.names), wider.parameters
     priors = np.zeros((count, triangle.shape[1]))
-    priors[:, :count] = problem.prior_root
-    priors[:, -1] = -problem.missed(fit.state.numbers)
+    priors[:, :count] = problem.parameters.prior_root
+    priors[:, -1] = -problem.parameters.missed(fit.state.numbers)
     whole, scale = np.vstack((triangle, priors)), problem.scale
     left, sizes, right = np.linalg.svd(whole[:, :count] * scale, full_matrices=False)
     seen = sizes > OPEN * sizes[0]
@@ -210,7 +211,7 @@ def _criticism(
     rest = whole[:, count:] - left @ known_part  # effects that no change of the estimated parameters reproduces
     steps = scale[:, None] * (right[seen].T / sizes[seen] @ known_part[:, :-1])
     shifts = -fit.state.machine.slopes[:, None] * steps  # derivatives of the P values by the fixed parameters
-    stated, deviation = np.flatnonzero(parameters.stated[count:]), wider.prior_deviation[count:]
+    stated, deviation = np.flatnonzero(parameters.stated[count:]), wider.parameters.internal_deviation[count:]
     effect = shifts[:, stated] * deviation[stated]
     considered = np.asarray(effect @ effect.T)
     standard_error = np.sqrt(np.diagonal(covariance + considered))

@@ -14,7 +14,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors, count_of_frequencies, reading_deviations
 from sagline.calibration.observations import machine_of, unwhitened_slopes, winch_slopes
-from sagline.calibration.parameters import Parameters, internal, prior_root, prior_units, values_in
+from sagline.calibration.parameters import Parameters, prior_units
 from sagline.calibration.straight import whitened_errors
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.indices import evenly_spaced
@@ -264,12 +264,11 @@ def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Arra
     m, parameters = found.robot.cable_count, found.parameters
     lengths = np.atleast_2d(found.unstrained_length)[used]
     scale = prior_units(parameters).scale
-    step = (internal(parameters, found.values) - internal(parameters, parameters.prior)) / scale
-    deviation = parameters.prior_deviation / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
-    root = prior_root(parameters) * (scale / deviation)
+    step = (parameters.internal(found.values) - parameters.internal(parameters.prior)) / scale
+    root = parameters.prior_root * scale
     root *= np.sqrt(len(used) / len(found.rows))  # the prior information per pose is the same as in the whole log
     if found.model.code == codes.STRAIGHT:
-        numbers = found.length_offset, values_in(parameters, found.values, kinds.SCALE, 1.0)
+        numbers = found.length_offset, parameters.of_cables(found.values, kinds.SCALE, 1.0)
         machine = machine_of(found.robot, found.model, parameters, found.sensors, *numbers)
         slopes = winch_slopes(machine, lengths)
         rows, noise, misfit = whitened_errors(machine, slopes, pose_rows(found.poses)[used], found.residuals[used])

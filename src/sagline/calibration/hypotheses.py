@@ -100,7 +100,7 @@ class Trial:
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
         zeros = np.array([name == "length_zero" for name in problem.parameters.names])
-        departure = float(np.mean((off / problem.prior_deviation) ** 2))
+        departure = float(np.mean((off / problem.parameters.internal_deviation) ** 2))
         return quality, departure, moved + off[zeros]
 
     def promise(self, change: Hypothesis, steps: int) -> float:

@@ -112,7 +112,7 @@ def _exchange(found: Information) -> None:
 def deviations_of(rows: Array, held: Array, root: Array) -> Array:
     """Standard deviations (P,) of the parameters; infinite for unobserved parameters.
 
-    rows: whitened slopes; held: inverse prior deviations (P,); root: `prior_root` (P, P).
+    rows: whitened slopes; held: inverse prior deviations (P,); root: `correlation_root` (P, P).
     """
     whole = np.concatenate((rows.reshape(-1, len(held)), root * held))
     _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # J^T J would square the condition number

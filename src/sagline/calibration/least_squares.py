@@ -188,7 +188,7 @@ def _cost_of(problem: FitProblem, current: Evaluated, kept: Flags, scale: float)
         limit = _limits_of(normal.readings[kept], scale)
         with np.errstate(divide="ignore", invalid="ignore"):
             squares = np.where(squares <= limit, squares, limit * (1.0 + np.log(squares / limit)))
-    missed = problem.missed(state.numbers)
+    missed = problem.parameters.missed(state.numbers)
     return float(squares.sum() + missed @ missed)
 
 
@@ -249,10 +249,10 @@ def best_step(problem: FitProblem, state: SearchState, normal: Normal) -> tuple[
     The step is zero along directions with neither observations nor a prior.
     """
     scale = problem.scale
-    root = problem.prior_root * scale
-    downhill = scale * normal.gradient - root.T @ problem.missed(state.numbers)
+    root = problem.parameters.prior_root * scale
+    downhill = scale * normal.gradient - root.T @ problem.parameters.missed(state.numbers)
     matrix = scale[:, None] * normal.matrix * scale + root.T @ root
-    step = _lowest(matrix, downhill, positive=bool(np.isfinite(problem.prior_deviation).all()))
+    step = _lowest(matrix, downhill, positive=bool(np.isfinite(problem.parameters.internal_deviation).all()))
     lower = (problem.least - state.numbers) / scale
     if (step < lower).any():
         step = _lowest_within(matrix, downhill, lower)

@@ -11,7 +11,7 @@ from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel
 from sagline.calibration.further import FurtherReadings, FurtherRows, frequency_rows, swivel_rows, whitened_further
 from sagline.calibration.log import Sensors, load_cells_of, measures_yaw, reading_deviations
-from sagline.calibration.parameters import KINDS, Parameters, slopes_of_values
+from sagline.calibration.parameters import Parameters, slopes_of_values
 from sagline.core.arrays import Array, kernel_input, locked
 from sagline.core.progress import blocks
 from sagline.kernels.calibration import kinds
@@ -271,7 +271,7 @@ def _with_further(
 
 def _steps(machine: MachineTerms) -> Array:
     """Steps (P,) of the internal parameters for difference quotients of frequencies."""
-    return np.array([KINDS[name].assumed for name in machine.parameters.names]) * FREQUENCY_STEP
+    return machine.parameters.usual_deviation * FREQUENCY_STEP
 
 
 def _no_readings(lengths: Array) -> PoseReadings:

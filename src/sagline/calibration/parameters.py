@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sagline.calibration.further import with_inertia
 from sagline.calibration.log import Sensors, measures_yaw
@@ -34,9 +35,21 @@ class Kind(NamedTuple):
     logarithmic: bool  # True if the logarithm is estimated, because the value is positive and its deviation is relative
     deviation: float  # standard deviation of a value from a drawing or data sheet, relative if logarithmic
     assumed: float  # standard deviation of a value that the robot's source does not state
-    # readings that depend on the quantity, as in `is_observed`; "" for all
-    needs: str = ""
+    needs: str = ""  # readings that depend on the quantity, as in `is_observed`; "" for all
     common: float = 0.0  # share of the prior variance that the values of all cables have in common, 0 to 1
+
+    def is_observed(self, sensors: Sensors, *, counted: bool) -> bool:
+        """True if a log has the kind of readings that the unknown needs."""
+        return {
+            "": True,
+            "counts": counted,
+            "lengths": not counted,
+            "motion": False,  # `calibrate` checks the times of a log
+            "load cells": sensors.tension_deviation is not None,
+            "frequencies": sensors.frequency_deviation is not None,
+            "swivel angles": sensors.swivel_deviation is not None,
+            "positions": sensors.position_deviation is not None or measures_yaw(sensors),
+        }[self.needs]
 
 
 _XYZ: Final = ("x", "y", "z")
@@ -126,6 +139,56 @@ class Parameters(Result):
     logarithmic: Flags
     counted: bool
 
+    def internal(self, values: Array) -> Array:
+        """Internal parameters (P,): the logarithm of a value where `logarithmic` is True, else the value."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.logarithmic, np.log(values), values)
+
+    def external(self, numbers: Array) -> Array:
+        """Values (P,) in their units, computed from the internal parameters `numbers`; inverse of `internal`."""
+        with np.errstate(over="ignore"):
+            return np.where(self.logarithmic, np.exp(numbers), numbers)
+
+    @property
+    def internal_deviation(self) -> Array:
+        """Standard deviations (P,) of the priors of the internal parameters."""
+        return np.asarray(self.prior_deviation / np.where(self.logarithmic, self.prior, 1.0))
+
+    @property
+    def usual_deviation(self) -> Array:
+        """Usual standard deviations (P,) of internal parameters whose values the robot's source does not state."""
+        return np.array([KINDS[name].assumed for name in self.names])
+
+    @property
+    def prior_root(self) -> Array:
+        """Matrix W (P, P), for which W^T W is the inverse of the covariance of the internal priors."""
+        return np.asarray(correlation_root(self) / self.internal_deviation)
+
+    def missed(self, numbers: Array) -> Array:
+        """Differences (P,) of the internal parameters `numbers` from their priors, in prior standard deviations."""
+        return np.asarray(self.prior_root @ (numbers - self.internal(self.prior)))
+
+    def of_cables(self, values: Array, row: int, otherwise: float) -> Array:
+        """Values (m,) of the cables in the row `row` of `kinds`; `otherwise` for a cable without this parameter."""
+        where = self.where[row]
+        return np.where(where >= 0, values[where], otherwise)
+
+    def length_offset(self, values: Array) -> Array:
+        """Offset (m,) that is added to reported lengths [m] after their scaling; zero for counts."""
+        return np.zeros(self.where.shape[1]) if self.counted else self.of_cables(values, kinds.ZERO, 0.0)
+
+    def by_quantity(self, numbers: Array) -> dict[str, Array]:
+        """Dictionary from names of the robot's quantities to arrays, in which `numbers` (P,) are sorted by quantity."""
+        found = {}
+        for name in dict.fromkeys(self.names):
+            if name not in UNCERTAIN or (name == "length_zero" and not self.counted):
+                continue
+            kind = KINDS[name]
+            rows = numbers[self.where[kind.first : kind.first + len(kind.axes)]].T
+            own = rows if kind.each else rows[0]
+            found[name] = own if len(kind.axes) > 1 else own[..., 0]
+        return found
+
 
 UNKNOWNS: Final = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 OF_CELLS: Final = ("load_cell_gain", "load_cell_bias")
@@ -177,13 +240,8 @@ def checked_unknowns(unknowns: Sequence[str | Unknown], sensors: Sensors, *, str
     given = elements(unknowns, str | Unknown, "unknowns", 'Give ("frame_anchors", "mass"), for example.')
     if not given:
         raise InvalidValueError("unknowns", "none", "at least one", f"Name some of {', '.join(KINDS)}.")
-    items = [
-        one
-        for item in given
-        for one in (
-            _default_unknowns(sensors, straight=straight) if isinstance(item, str) and item == DEFAULT else (item,)
-        )
-    ]
+    default = _default_unknowns(sensors, straight=straight)
+    items = [one for item in given for one in (default if item == DEFAULT else (item,))]
     found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
     names = [one.name for one in found]
     if twice := [name for name in names if names.count(name) > 1]:
@@ -222,24 +280,10 @@ def _field(robot: Robot, name: str) -> Array | None:
     return value_of(robot, name)
 
 
-def is_observed(kind: Kind, sensors: Sensors, counted: bool) -> bool:
-    """True if the log has the kind of readings that the unknown `kind` needs."""
-    return {
-        "": True,
-        "counts": counted,
-        "lengths": not counted,
-        "motion": False,  # `calibrate` checks the times of a log
-        "load cells": sensors.tension_deviation is not None,
-        "frequencies": sensors.frequency_deviation is not None,
-        "swivel angles": sensors.swivel_deviation is not None,
-        "positions": sensors.position_deviation is not None or measures_yaw(sensors),
-    }[kind.needs]
-
-
 def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: Kind, counted: bool) -> None:
     """Reject unknowns with neither observations nor a prior."""
     known = unknown.deviation is not None or unknown.name in robot.tolerances
-    if known or kind.needs == "motion" or is_observed(kind, sensors, counted):
+    if known or kind.needs == "motion" or kind.is_observed(sensors, counted=counted):
         return
     add = {
         "counts": "Add counts to the log, or leave it out.",
@@ -281,20 +325,8 @@ def _prior_deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> 
     return (width * np.abs(own) if kind.logarithmic else width), False
 
 
-def internal(parameters: Parameters, values: Array) -> Array:
-    """Internal parameters (P,): the logarithm of a value where `parameters.logarithmic` is True, else the value."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(parameters.logarithmic, np.log(values), values)
-
-
-def external(parameters: Parameters, numbers: Array) -> Array:
-    """Values (P,) in their units, computed from the internal parameters `numbers`; inverse of `internal`."""
-    with np.errstate(over="ignore"):
-        return np.where(parameters.logarithmic, np.exp(numbers), numbers)
-
-
 @lru_cache(maxsize=8)  # a search needs the root of the same parameters many times
-def prior_root(parameters: Parameters) -> Array:
+def correlation_root(parameters: Parameters) -> Array:
     """Symmetric root (P, P) of the inverse prior correlation; the identity if no kind has a `common` share."""
     root = np.eye(len(parameters.names))
     for kind in KINDS.values():
@@ -318,22 +350,9 @@ def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
     return slopes
 
 
-def quantities_of(parameters: Parameters, numbers: Array) -> dict[str, Array]:
-    """Dictionary from names of the robot's quantities to arrays, in which `numbers` (P,) are sorted by quantity."""
-    found = {}
-    for name in dict.fromkeys(parameters.names):
-        if name not in UNCERTAIN or (name == "length_zero" and not parameters.counted):
-            continue
-        kind = KINDS[name]
-        rows = numbers[parameters.where[kind.first : kind.first + len(kind.axes)]].T
-        own = rows if kind.each else rows[0]
-        found[name] = own if len(kind.axes) > 1 else own[..., 0]
-    return found
-
-
 def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
     """Robot with the parameter values `values` (P,); raises an error if a value is invalid."""
-    changed = with_quantities(robot, quantities_of(parameters, values))
+    changed = with_quantities(robot, parameters.by_quantity(values))
     if "inertia" not in parameters.names:
         return changed
     return with_inertia(changed, values[parameters.where[kinds.INERTIA : kinds.INERTIA + 3, 0]])
@@ -345,23 +364,10 @@ def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sen
     if "target" in parameters.names:
         changes["target"] = values[parameters.where[kinds.TARGET : kinds.TARGET + 3, 0]]
     if "measuring_frame" in parameters.names:
-        from scipy.spatial.transform import Rotation
-
         turn = Rotation.from_rotvec(values[parameters.where[kinds.TURN : kinds.TURN + 3, 0]])
         shift = values[parameters.where[kinds.SHIFT : kinds.SHIFT + 3, 0]]
         changes["frame"] = Pose(shift, turn.as_matrix() @ sensors.frame.matrix)
     return sensors.replace(**changes) if changes else sensors
-
-
-def offset_with(robot: Robot, parameters: Parameters, values: Array) -> Array:
-    """Offset (m,) that is added to reported lengths [m] after their scaling; zero for counts."""
-    return np.zeros(robot.cable_count) if parameters.counted else values_in(parameters, values, kinds.ZERO, 0.0)
-
-
-def values_in(parameters: Parameters, values: Array, row: int, otherwise: float) -> Array:
-    """Values (m,) of the cables in the row `row` of `kinds`; `otherwise` for a cable without this parameter."""
-    where = parameters.where[row]
-    return np.where(where >= 0, values[where], otherwise)
 
 
 _FIXED: Final = 5e-2  # a parameter is known if its stated deviation is less than this share of the usual deviation
@@ -381,11 +387,11 @@ def prior_units(parameters: Parameters) -> PriorUnits:
 
     A unit is at most `_WIDE` usual deviations, because rounding would otherwise hide the other parameters.
     """
-    usual = np.array([KINDS[name].assumed for name in parameters.names])
-    usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
+    size = np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
+    usual = parameters.usual_deviation * size
     units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
     units = np.minimum(units, _WIDE * usual)
-    scale = units / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
+    scale = units / size
     common = np.array([KINDS[name].deviation for name in parameters.names])
     fixed = parameters.stated & (scale < _FIXED * common)
     return PriorUnits(scale, units, np.flatnonzero(~fixed).astype(np.int64))

@@ -16,11 +16,10 @@ from sagline.calibration.log import Sensors
 from sagline.calibration.observations import has_drum_data, machine_of, predicted_rows
 from sagline.calibration.parameters import (
     DEFAULT,
-    KINDS,
     Parameters,
     Unknown,
+    correlation_root,
     parameters_of,
-    prior_root,
 )
 from sagline.core.arguments import callback, instance, optional, whole_number
 from sagline.core.arrays import Array, Flags, Indices, locked
@@ -255,7 +254,7 @@ def calibration_poses(
     stable = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))
     standing, rows = standing.part(stable), _read(rows[stable])
     _refuse(robot, parameters, size, tried, rows)
-    root, unit = prior_root(parameters), scale * np.abs(machine.slopes)
+    root, unit = correlation_root(parameters), scale * np.abs(machine.slopes)
     known = information.prior_information(rows, root)
     chosen, gain, deviation = information.choose_informative(rows, known, size)
     order = chosen[_driving_order(standing.part(chosen))]
@@ -301,7 +300,7 @@ def _default_sensors(robot: Robot, tensions: Array) -> Sensors:
 def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
     """Units (P,) of the internal parameters, and inverse prior deviations (P,) in these units; 0 without a prior."""
     deviation = parameters.prior_deviation / np.abs(slopes)
-    loose = np.array([LOOSE * KINDS[name].assumed for name in parameters.names])
+    loose = LOOSE * parameters.usual_deviation
     scale = np.fmin(deviation, loose)
     return scale, scale / deviation
 

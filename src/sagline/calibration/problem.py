@@ -19,17 +19,7 @@ from sagline.calibration.observations import (
     machine_of,
     winch_slopes,
 )
-from sagline.calibration.parameters import (
-    KINDS,
-    Parameters,
-    external,
-    internal,
-    offset_with,
-    prior_root,
-    sensors_with,
-    values_in,
-    with_values,
-)
+from sagline.calibration.parameters import Parameters, sensors_with, with_values
 from sagline.calibration.straight import lines_at
 from sagline.core.arrays import Array, Flags, locked
 from sagline.kernels import codes
@@ -83,13 +73,7 @@ class FitProblem(NamedTuple):
     @property
     def prior(self) -> Array:
         """Prior values (P,) of the internal parameters."""
-        return internal(self.parameters, self.parameters.prior)
-
-    @property
-    def prior_deviation(self) -> Array:
-        """Standard deviations (P,) of the priors of the internal parameters."""
-        known, prior = self.parameters.prior_deviation, self.parameters.prior
-        return np.asarray(known / np.where(self.parameters.logarithmic, prior, 1.0))
+        return self.parameters.internal(self.parameters.prior)
 
     @property
     def relative(self) -> bool:
@@ -120,23 +104,13 @@ class FitProblem(NamedTuple):
             return None
         return FurtherReadings(*(None if read is None else read[part] for read in given))
 
-    def missed(self, numbers: Array) -> Array:
-        """Differences (P,) between the internal parameters `numbers` and their priors, in prior standard deviations."""
-        return np.asarray(self.prior_root @ (numbers - self.prior))
-
-    @property
-    def prior_root(self) -> Array:
-        """Matrix W (P, P), for which W^T W is the inverse of the prior covariance."""
-        return np.asarray(prior_root(self.parameters) / self.prior_deviation)
-
     @property
     def scale(self) -> Array:
         """Scale (P,) of each internal parameter: its prior deviation or its usual deviation, whichever is smaller.
 
         With a larger scale, rounding errors would hide the sums of squares of well-observed parameters.
         """
-        usual = np.array([KINDS[name].assumed for name in self.parameters.names])
-        return np.asarray(np.fmin(self.prior_deviation, usual))
+        return np.asarray(np.fmin(self.parameters.internal_deviation, self.parameters.usual_deviation))
 
     @property
     def least(self) -> Array:
@@ -145,11 +119,11 @@ class FitProblem(NamedTuple):
 
     def machine_at(self, numbers: Array) -> MachineTerms:
         """Robot and sensors with the internal parameters `numbers` (P,); raises an error if the robot rejects them."""
-        values, parameters = external(self.parameters, numbers), self.parameters
-        robot = with_values(self.robot, parameters, values)
-        sensors, offset = sensors_with(self.sensors, parameters, values), offset_with(self.robot, parameters, values)
-        scale = values_in(parameters, values, kinds.SCALE, 1.0)
-        late, turned = (values_in(parameters, values, row, 0.0) for row in (kinds.CLOCK, kinds.SWIVEL))
+        parameters = self.parameters
+        values = parameters.external(numbers)
+        robot, sensors = with_values(self.robot, parameters, values), sensors_with(self.sensors, parameters, values)
+        offset, scale = parameters.length_offset(values), parameters.of_cables(values, kinds.SCALE, 1.0)
+        late, turned = (parameters.of_cables(values, row, 0.0) for row in (kinds.CLOCK, kinds.SWIVEL))
         return machine_of(robot, self.model, parameters, sensors, offset, scale, late, turned)
 
     def reported_lengths(self, machine: MachineTerms, part: slice = slice(None)) -> Array:
@@ -213,7 +187,7 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     tensions, because an anchor error of one millimeter changes the tension of a steel cable by about 90 N.
     """
     numbers = problem.prior
-    offset = offset_with(problem.robot, problem.parameters, problem.parameters.prior)
+    offset = problem.parameters.length_offset(problem.parameters.prior)
     machine = machine_of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
     reported = problem.reported_lengths(machine)
     poses = _poses(problem, machine, reported, commanded)

@@ -11,7 +11,6 @@ from sagline.calibration import findings, summary
 from sagline.calibration.findings import Findings, SensorDeviation
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import MachineTerms, machine_of, unwhitened_slopes, winch_slopes
-from sagline.calibration.parameters import values_in
 from sagline.calibration.straight import slopes_of_poses
 from sagline.core.arguments import choice, flag
 from sagline.core.arrays import Array, locked, numbers
@@ -227,12 +226,12 @@ class Calibration(Findings, Saved):
     @property
     def length_scale(self) -> Array:
         """Scale of reported lengths, shape (m,); 1 where it was not estimated."""
-        return values_in(self.parameters, self.values, kinds.SCALE, 1.0)
+        return self.parameters.of_cables(self.values, kinds.SCALE, 1.0)
 
     @property
     def swivel_zero(self) -> Array:
         """Readings of swivel angles of cables along x [rad], shape (m,); 0 where they were not estimated."""
-        return values_in(self.parameters, self.values, kinds.SWIVEL, 0.0)
+        return self.parameters.of_cables(self.values, kinds.SWIVEL, 0.0)
 
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
         reported = self.length_offset, self.length_scale

@@ -86,7 +86,7 @@ def search_from_priors(
 def _initial_squares(problem: FitProblem, current: Evaluated) -> tuple[int, float]:
     """Number of poses without an equilibrium, and sum of squares of the other poses and of the priors."""
     state, normal = current
-    there, missed = np.isfinite(normal.squares), problem.missed(state.numbers)
+    there, missed = np.isfinite(normal.squares), problem.parameters.missed(state.numbers)
     return int(np.count_nonzero(~there)), float(normal.squares[there].sum() + missed @ missed)
 
 

@@ -12,7 +12,7 @@ from scipy.special import bdtrc
 from sagline.calibration import findings
 from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier, sensor_deviations
 from sagline.calibration.identifiability import easiest_measurement
-from sagline.calibration.parameters import KINDS, OF_FORCES, Parameters, internal, is_observed, prior_root
+from sagline.calibration.parameters import KINDS, OF_FORCES, Parameters
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 from sagline.kernels import codes
@@ -171,8 +171,7 @@ def _criticisms(found: Findings, width: int) -> Iterator[str]:
 def _departures(found: Findings, width: int) -> Iterator[str]:
     """Lines of the values that differ from the robot file by more than `FAR` prior standard deviations."""
     numbers = found.parameters
-    deviation = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
-    off = prior_root(numbers) @ ((internal(numbers, found.values) - internal(numbers, numbers.prior)) / deviation)
+    off = numbers.missed(numbers.internal(found.values))
     far = np.flatnonzero(np.abs(off) > FAR)
     if far.size:
         yield f"Far from the robot file, by more than {n(FAR, '.2g')} prior deviations:"
@@ -185,7 +184,9 @@ def _departures(found: Findings, width: int) -> Iterator[str]:
 
 def _held(found: Findings, width: int) -> Iterator[str]:
     """Lines with the parameters that were not estimated."""
-    observed = [name for name, kind in KINDS.items() if is_observed(kind, found.sensors, found.parameters.counted)]
+    observed = [
+        name for name, kind in KINDS.items() if kind.is_observed(found.sensors, counted=found.parameters.counted)
+    ]
     without_effect = OF_FORCES if found.model.code == codes.STRAIGHT else ()
     missing = ("pulley_radius", "dead_cable") if found.before.winches is None else ()
     fixed = [name for name in observed if name not in (*found.parameters.names, *without_effect, *missing)]
