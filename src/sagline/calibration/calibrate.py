@@ -14,7 +14,7 @@ from sagline.calibration import diagnostics
 from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
-from sagline.calibration.log import Sensors, WinchLog
+from sagline.calibration.log import READINGS, Sensors, WinchLog
 from sagline.calibration.parameters import (
     DEFAULT,
     OF_CELLS,
@@ -176,18 +176,8 @@ def _without_inertia(log: WinchLog, moving: Flags) -> WinchLog:
 
 def active_sensors(log: WinchLog) -> Sensors:
     """Sensors with at least one reading in a log."""
-    silent = {
-        name: None
-        for name, read in (
-            ("tension_deviation", log.load_cells),
-            ("position_deviation", log.position),
-            ("rotation_deviation", log.rotation),
-            ("swivel_deviation", log.swivel),
-            ("frequency_deviation", log.frequency),
-        )
-        if read is None or np.isnan(read).all()
-    }
-    return log.sensors.replace(**silent)
+    readings = ((deviation, getattr(log, name)) for name, deviation in READINGS.items())
+    return log.sensors.replace(**{name: None for name, read in readings if read is None or np.isnan(read).all()})
 
 
 def _check_model(robot: Robot, model: CableModel) -> None:

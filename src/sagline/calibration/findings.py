@@ -207,6 +207,7 @@ class Findings(Result):
 
 
 QUANTITIES: Final = ("length", "load cell", "position", "rotation", "swivel angle", "frequency")
+UNITS: Final = dict(zip(QUANTITIES, ("m", "N", "m", "rad", "rad", "Hz"), strict=True))
 FEWEST: Final = 10.0  # smallest redundancy of a group of readings for which there is an estimate
 LARGEST: Final = 0.3  # largest relative standard error of an estimate; otherwise there is no estimate
 GROSS: Final = 4.5  # standard deviations: a smaller error is not an outlier

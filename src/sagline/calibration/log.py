@@ -145,8 +145,15 @@ def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
     return (1.0, 0.0) if robot.winches is None else (robot.winches.load_cell_gain, robot.winches.load_cell_bias)
 
 
-_TABLES = ("counts", "unstrained_length", "load_cells", "position", "rotation", "swivel", "frequency")
-_BY_ROW = (*_TABLES, "time", "commanded")
+# readings that a log may have beside the counts or lengths, and their standard deviations
+READINGS = {
+    "load_cells": "tension_deviation",
+    "position": "position_deviation",
+    "rotation": "rotation_deviation",
+    "swivel": "swivel_deviation",
+    "frequency": "frequency_deviation",
+}
+_BY_ROW = ("counts", "unstrained_length", *READINGS, "time", "commanded")
 _UNIT = 1e-6  # allowed error of a quaternion's norm; quaternions that were printed with seven digits are accepted
 
 
@@ -294,20 +301,12 @@ class WinchLog(_Replaceable, Saved, Tabular):
             >>> print(log.at_rest().unstrained_length.round(3).tolist())
             [[2.0], [3.0]]
         """
-        readings = (
-            (self.counts, rest.deviation_of_counts(self.counts)),
-            (self.unstrained_length, self.sensors.length_deviation),
-            (self.load_cells, self.sensors.tension_deviation),
-            (self.position, self.sensors.position_deviation),
-            (rest.rotation_vectors(self.rotation), self.sensors.rotation_deviation),
-            (self.swivel, self.sensors.swivel_deviation),
-        )
-        parts = rest.rests_of(self.time, readings, number(duration, "duration", "s", above=0.0))
-        means: dict[str, Any] = {}
-        for name in _BY_ROW:
-            if isinstance(values := getattr(self, name), np.ndarray):
-                mean = rest.mean_rotation if name == "rotation" else rest.mean_of_rows
-                means[name] = np.array([mean(values[part]) for part in parts])
+        deviations = {"unstrained_length": "length_deviation", **READINGS}
+        del deviations["frequency"]
+        readings = {name: (getattr(self, name), getattr(self.sensors, own)) for name, own in deviations.items()}
+        parts = rest.rests_of(self.time, self.counts, readings, number(duration, "duration", "s", above=0.0))
+        arrays = {name: values for name in _BY_ROW if isinstance(values := getattr(self, name), np.ndarray)}
+        means: dict[str, Any] = {**rest.means_of(arrays, parts)}
         return evolve(self.rows(np.array([(part.start + part.stop) // 2 for part in parts])), **means)
 
     def __str__(self) -> str:
@@ -381,20 +380,12 @@ def _ascending(frequency: Array) -> Array:
 
 def _check_sensors(log: WinchLog, cables: int) -> None:
     """Reject readings without a standard deviation, and standard deviations for a wrong number of cables."""
-    pairs = (
-        ("length_deviation", log.readings, cables),
-        ("tension_deviation", log.load_cells, cables),
-        ("position_deviation", log.position, 3),
-        ("rotation_deviation", log.rotation, 3),
-        ("swivel_deviation", log.swivel, cables),
-        ("frequency_deviation", log.frequency, 0 if log.frequency is None else log.frequency.shape[1]),
-    )
-    for name, read, size in pairs:
-        deviation = getattr(log.sensors, name)
-        item, read_name = f"sensors: {name}", name.removesuffix("_deviation").replace("tension", "load_cells")
-        if read is not None and deviation is None:
-            step = f"Give sensors=Sensors({name}=...), or leave {read_name} out."
-            raise InvalidValueError(item, "None", f"the standard deviation of {read_name}", step)
+    sizes = (cables, cables, 3, 3, cables, 0 if log.frequency is None else log.frequency.shape[1])
+    for (read, name), size in zip({"readings": "length_deviation", **READINGS}.items(), sizes, strict=True):
+        deviation, item = getattr(log.sensors, name), f"sensors: {name}"
+        if getattr(log, read) is not None and deviation is None:
+            step = f"Give sensors=Sensors({name}=...), or leave {read} out."
+            raise InvalidValueError(item, "None", f"the standard deviation of {read}", step)
         if deviation is not None and deviation.shape not in ((), (size,)):
             step = "Give one value for all, or one value per entry."
             raise InvalidValueError(item, f"of shape {deviation.shape}", f"shape () or ({size},)", step)

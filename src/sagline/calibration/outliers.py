@@ -117,15 +117,20 @@ def _fit_of_pose(case: _Case, taken: Sequence[_Suspect], which: Indices) -> _Sus
     misses = off[read] / case.deviation[read]
     inverse = np.linalg.pinv(columns)
     found, errors = inverse @ misses, inverse @ inverse.T
-    rest, first, sizes, deviations = misses - columns @ found, by_pose.shape[1], [], []
+    rest, first = misses - columns @ found, by_pose.shape[1]
+    return _suspect_fit(float(rest @ rest), taken, found[first:], errors[first:, first:])
+
+
+def _suspect_fit(squares: float, taken: Sequence[_Suspect], found: Array, covariance: Array) -> _SuspectFit:
+    """Fit with the sum of squares `squares`; found, covariance: errors of the readings of all suspects in `taken`."""
+    sizes, deviations, first = [], [], 0
     for one in taken:
         part = slice(first, first + len(one.which))
-        own = found[part]
+        own, weight = found[part], np.linalg.pinv(covariance[part, part], hermitian=True)
         sizes.append(float(own[0]) if one.cable is not None else float(np.linalg.norm(own)))
-        squares = float(own @ np.linalg.pinv(errors[part, part], hermitian=True) @ own)
-        deviations.append(max(squares, 0.0) ** 0.5)
+        deviations.append(max(float(own @ weight @ own), 0.0) ** 0.5)
         first = part.stop
-    return _SuspectFit(float(rest @ rest), sizes, deviations)
+    return _SuspectFit(squares, sizes, deviations)
 
 
 def _linear_fit(
@@ -144,15 +149,8 @@ def _linear_fit(
     errors = np.zeros(len(misses))
     errors[which] = off
     wanted: Array = case.readings.lengths[0] - errors[:m] + variance * (slopes.T @ cho_solve(factor, rest))
-    sizes, deviations, first = [], [], 0
-    for one in taken:
-        part = slice(first, first + len(one.which))
-        own, spread = off[part], np.linalg.pinv(inverse[part, part], hermitian=True)
-        sizes.append(float(own[0]) if one.cable is not None else float(np.linalg.norm(own)))
-        deviations.append(float(np.sqrt(max(own @ spread @ own, 0.0))))
-        first = part.stop
     squares = float(np.sum((misses / case.deviation)[counts] ** 2))
-    return _SuspectFit(float(rest @ cho_solve(factor, rest)), sizes, deviations), wanted, squares
+    return _suspect_fit(float(rest @ cho_solve(factor, rest)), taken, off, inverse), wanted, squares
 
 
 def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Case | None:

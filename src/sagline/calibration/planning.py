@@ -12,7 +12,8 @@ import numpy as np
 from sagline.cables.models import Catenary
 from sagline.calibration import information
 from sagline.calibration.candidates import CandidatePoses, candidates_of, shortest_tour, tour_length
-from sagline.calibration.log import Sensors
+from sagline.calibration.findings import UNITS
+from sagline.calibration.log import READINGS, Sensors
 from sagline.calibration.observations import has_drum_data, machine_of, predicted_rows
 from sagline.calibration.parameters import (
     DEFAULT,
@@ -94,17 +95,11 @@ def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
     places = position[np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1)))]  # no repetition
     way = n(tour_length(places, np.arange(len(places))), ".3g", "m")
     what = f"{counted(len(plan), 'pose')} to find {counted(len(plan.parameters.names), 'number')} of {plan.robot.name}"
-    sensors = (
-        ("lengths", read.length_deviation, "m"),
-        ("load cells", read.tension_deviation, "N"),
-        ("positions", read.position_deviation, "m"),
-        ("rotations", read.rotation_deviation, "rad"),
-        ("swivel angles", read.swivel_deviation, "rad"),
-    )
+    deviations = [getattr(read, name) for name in ("length_deviation", *READINGS.values())]
     texts = [
-        f"{words} ({information.error_text(float(np.max(deviation[np.isfinite(deviation)])), unit)})"
-        for words, deviation, unit in sensors
-        if deviation is not None
+        f"{quantity}s ({information.error_text(float(np.max(deviation[np.isfinite(deviation)])), UNITS[quantity])})"
+        for quantity, deviation in zip(UNITS, deviations, strict=True)
+        if deviation is not None and quantity != "frequency"
     ]
     if plan.enough < len(plan):
         enough = f"With {counted(plan.enough, 'pose')}, an additional pose reduces no error by more than 1{SPACE}%."
@@ -238,8 +233,7 @@ def calibration_poses(
     where = _box(robot, box)
     standing = candidates_of(robot, _CATENARY, where, tried, drawn, progress)
     read = sensors or _default_sensors(robot, standing.tensions)
-    others = read.tension_deviation, read.position_deviation, read.rotation_deviation, read.swivel_deviation
-    if all(deviation is None for deviation in others):
+    if all(getattr(read, deviation) is None for name, deviation in READINGS.items() if name != "frequency"):
         step = "Give Sensors(tension_deviation=...), or leave sensors out."
         raise InvalidValueError("sensors", "lengths alone", "load cells, positions or rotations in addition", step)
     parameters = parameters_of(robot, (DEFAULT,) if unknowns is None else unknowns, read, counted=has_drum_data(robot))

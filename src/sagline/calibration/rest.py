@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -17,15 +17,21 @@ _COUNTS: Final = 1e-3  # width of the band of counts, relative to their range in
 _CUT: Final = 10  # one row of this number of rows is omitted at both ends of a rest, because motion fades there
 
 
-def rests_of(time: Array | None, readings: Sequence[tuple[Array | None, Array | None]], duration: float) -> list[slice]:
-    """Rows of each rest of at least `duration` [s]. The criterion is described in `WinchLog.at_rest`.
+Readings = Mapping[str, tuple[Array | None, Array | None]]  # tables (N, columns) or None, and standard deviations
 
-    readings: tables (N, columns) or None, each with the standard deviation of its columns.
-    """
+
+def rests_of(time: Array | None, counts: Array | None, readings: Readings, duration: float) -> list[slice]:
+    """Rows of each rest of at least `duration` [s]. The criterion is described in `WinchLog.at_rest`."""
     if time is None or (np.diff(time) <= 0.0).any():
         value = "missing" if time is None else "not increasing"
         raise InvalidValueError("time", value, "a later time in each row", "Log the time of each row.")
-    given = [read / deviation for read, deviation in readings if read is not None and deviation is not None]
+    given = [
+        (_rotation_vectors(read) if name == "rotation" else read) / deviation
+        for name, (read, deviation) in readings.items()
+        if read is not None and deviation is not None
+    ]
+    if counts is not None:
+        given.append(counts / np.maximum(_COUNTS / _BAND * np.ptp(counts, axis=0), 1.0))
     parts = list(_rests(np.hstack(given), time, duration))
     if not parts:
         step = "Stop longer at each pose, give larger deviations, or a shorter duration."
@@ -33,15 +39,16 @@ def rests_of(time: Array | None, readings: Sequence[tuple[Array | None, Array | 
     return parts
 
 
-def deviation_of_counts(counts: Array | None) -> Array | None:
-    """Standard deviation of counts (m,) for the search of rests."""
-    return None if counts is None else np.maximum(_COUNTS / _BAND * np.ptp(counts, axis=0), 1.0)
+def means_of(tables: Mapping[str, Array], parts: Sequence[slice]) -> dict[str, Array]:
+    """Means of the rows of each part of all tables (N, ...); the table "rotation" contains quaternions."""
+    return {
+        name: np.array([(_mean_rotation if name == "rotation" else _mean_of_rows)(table[part]) for part in parts])
+        for name, table in tables.items()
+    }
 
 
-def rotation_vectors(quaternions: Array | None) -> Array | None:
+def _rotation_vectors(quaternions: Array) -> Array:
     """Rotation vectors (N, 3) [rad] of quaternions (N, 4); NaN for a missing rotation."""
-    if quaternions is None:
-        return None
     missing = np.isnan(quaternions[:, :1])
     turns = Rotation.from_quat(np.where(missing, [0.0, 0.0, 0.0, 1.0], quaternions)).as_rotvec()
     return np.where(missing, np.nan, turns)
@@ -60,7 +67,7 @@ def _rests(values: Array, time: Array, duration: float) -> Iterator[slice]:
         cut = (end - begin) // _CUT
         part = slice(begin + cut, end - cut)
         half = (part.start + part.stop) // 2
-        trend = np.abs(mean_of_rows(values[part.start : half]) - mean_of_rows(values[half : part.stop]))
+        trend = np.abs(_mean_of_rows(values[part.start : half]) - _mean_of_rows(values[half : part.stop]))
         long = time[end - 1] - time[begin] >= duration
         # noise gives the difference of the means a standard deviation of the square root of 4/n
         if long and not (trend > _TREND + 3.0 * np.sqrt(4.0 / (part.stop - part.start))).any():
@@ -70,14 +77,14 @@ def _rests(values: Array, time: Array, duration: float) -> Iterator[slice]:
             begin = half if long else begin + 1
 
 
-def mean_of_rows(values: Array) -> Array:
+def _mean_of_rows(values: Array) -> Array:
     """Mean of the rows; NaN for a column without a reading."""
     known = ~np.isnan(values)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0))
 
 
-def mean_rotation(quaternions: Array) -> Array:
+def _mean_rotation(quaternions: Array) -> Array:
     """Mean of unit quaternions (n, 4); NaN if all are missing."""
     known = quaternions[~np.isnan(quaternions[:, 0])]
     return np.asarray(Rotation.from_quat(known).mean().as_quat() if len(known) else np.full(4, np.nan))

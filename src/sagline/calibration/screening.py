@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.calibration.findings import Omission
-from sagline.calibration.log import WinchLog, load_cells_of, measures_yaw
+from sagline.calibration.log import READINGS, WinchLog, load_cells_of, measures_yaw
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
@@ -80,9 +80,9 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
 
 def reading_count(log: WinchLog) -> int:
     """Number of informative readings. Lengths do not count, because every row has equally many unknown lengths."""
-    rotation = None if log.rotation is None else log.rotation[:, : 3 if measures_yaw(log.sensors) else 2]
-    read = log.load_cells, log.position, rotation, log.swivel, log.frequency
-    return sum(int(np.count_nonzero(~np.isnan(values))) for values in read if values is not None)
+    angles = {"rotation": 3 if measures_yaw(log.sensors) else 2}  # of four columns of a quaternion
+    read = ((getattr(log, name), angles.get(name)) for name in READINGS)
+    return sum(int(np.count_nonzero(~np.isnan(values[:, :width]))) for values, width in read if values is not None)
 
 
 def _incomplete(log: WinchLog) -> Flags:
@@ -96,8 +96,7 @@ def _incomplete(log: WinchLog) -> Flags:
 
 def _repeated(log: WinchLog) -> Flags:
     """True for each row with exactly the readings of an earlier row, (N,)."""
-    columns = log.readings, log.load_cells, log.position, log.rotation, log.swivel, log.frequency
-    read = [v for v in columns if v is not None]
+    read = [v for v in (getattr(log, name) for name in ("readings", *READINGS)) if v is not None]
     bits: list[NDArray[np.uint64]] = [np.ascontiguousarray(v + 0.0).view(np.uint64) for v in read]  # -0.0 becomes 0.0
     digest = np.zeros(len(log), dtype=np.uint64)
     odd = np.random.default_rng(0).integers(2**63, size=sum(b.shape[1] for b in bits), dtype=np.uint64) * 2 + 1

@@ -9,8 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from scipy.special import bdtrc
 
-from sagline.calibration import findings
-from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier, sensor_deviations
+from sagline.calibration.findings import UNITS, CalibrationStatus, Direction, Findings, Outlier, sensor_deviations
 from sagline.calibration.identifiability import easiest_measurement
 from sagline.calibration.parameters import KINDS, OF_FORCES, Parameters
 from sagline.core.arrays import Array, Indices
@@ -25,7 +24,6 @@ MANY: Final = 4  # a sensor with fewer outliers is not reported as faulty
 CHANCE: Final = 1e-3  # a sensor is faulty if the probability that chance gives it so many outliers is below this value
 MOST_OUTLIERS: Final = 12  # largest number of listed outliers; a last line counts the other outliers
 MOST_ROWS: Final = 8  # largest number of listed rows of the log; the text counts the other rows
-UNITS: Final = dict(zip(findings.QUANTITIES, ("m", "N", "m", "rad", "rad", "Hz"), strict=True))
 SMALL: Final = {"m": (1e3, "mm"), "N": (1.0, "N"), "rad": (1e3, "mrad"), "Hz": (1.0, "Hz")}  # factor, written unit
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
