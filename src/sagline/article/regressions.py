@@ -173,11 +173,10 @@ class SagStudy:
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> tuple[sl.CableState, sl.CableState, Array, Array]:
-    """States of a cable that does not stretch and of the elastic cable, and adjusting lengths [m] without elongation.
-
-    The adjusting lengths are those of the elastic cable, plus the elongation by equations (36) and (38), and plus the
-    true elongation.
-    """
+    """States of a cable that does not stretch and of the elastic cable, and adjusting lengths [m] without elongation."""
+    # The adjusting lengths are those of the elastic cable, plus the elongation by equations (36) and (38), and plus the
+    # true elongation.
+    #
     # The force at the platform end gives an elongation |T| L/EA that is too large by w L^2 sin(phi)/(2 EA), because the
     # mean force is smaller by half of the weight's part along the chord (erratum 5). Source: Gia Luan & Truong Thinh
     # 2020, (33) to (38), figures 8 and 9

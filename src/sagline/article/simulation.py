@@ -78,14 +78,10 @@ class PathStudy:
 
 
 def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
-    """Plan both robots along the article's path, and find the equilibria of exact cables with the planned lengths.
-
-    The lengths are planned as in the "simple controller" of the article, which computes lengths from tensions. The
-    actual pose is the equilibrium of exact cables with the planned lengths and the same inertial forces.
-
-    Source:
-        Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
-    """
+    """Plan both robots along the article's path, and find the equilibria of exact cables with the planned lengths."""
+    # The lengths are planned as in the "simple controller" of the article, which computes lengths from tensions. The
+    # actual pose is the equilibrium of exact cables with the planned lengths and the same inertial forces.
+    # Source: Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
     path = sl.article_path(rate)
     runs = [tuple(_run(sl.load_robot(name), path, model, METHOD) for model in models) for name in ROBOTS]
     suspended, mixed = runs

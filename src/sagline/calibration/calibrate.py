@@ -202,11 +202,9 @@ def _check_frequencies(robot: Robot, log: WinchLog) -> None:
 def _geometric_start(
     problem: FitProblem, log: WinchLog, rows: Indices, unknowns: Sequence[Unknown]
 ) -> SearchState | None:
-    """Initial state from a calibration with straight cables, for a log without load cells; None if it fails.
-
-    Without load cells, noise of the lengths makes cables slack at the reported lengths, and the search would end at one
-    of several minima.
-    """
+    """Initial state from a calibration with straight cables, for a log without load cells; None if it fails."""
+    # Without load cells, noise of the lengths makes cables slack at the reported lengths, and the search would end at
+    # one of several minima.
     asked = [one for one in unknowns if one.name not in (*OF_FORCES, "swivel_zero", "inertia")]
     try:
         found = calibrate(problem.robot, log, asked, model=Straight(), folds=0)
@@ -285,10 +283,8 @@ def _refuse(sentences: Iterable[str]) -> None:
 def _check_count(
     log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices], more: int, *, freely: bool
 ) -> None:
-    """Reject a log with fewer readings than unknowns; gains and biases of load cells count only with `freely`.
-
-    more: number of lengths minus number of motions of the poses, for straight cables.
-    """
+    """Reject a log with fewer readings than unknowns; gains and biases of load cells count only with `freely`."""
+    # more: number of lengths minus number of motions of the poses, for straight cables.
     wanted = len([name for name in parameters.names if freely or name not in OF_CELLS])
     readings = reading_count(log) + more
     if readings >= wanted:

@@ -44,11 +44,9 @@ class CandidatePoses(NamedTuple):
 def candidates_of(
     robot: Robot, model: CableModel, box: PoseBox, count: int, seed: int, progress: Progress | None = None
 ) -> CandidatePoses:
-    """At most `count` feasible poses of `box`, each with several sets of tensions near corners of the tension range.
-
-    Half of the poses are uniformly distributed in the box. Half of the poses are nearer to the faces of the box and to
-    the largest tilt, where readings are most informative. Raises an error with the reason if no pose is feasible.
-    """
+    """At most `count` feasible poses of `box`, each with several sets of tensions near corners of the tension range."""
+    # Half of the poses are uniformly distributed in the box. Half of the poses are nearer to the faces of the box and
+    # to the largest tilt, where readings are most informative. Raises an error with the reason if no pose is feasible.
     rng = np.random.default_rng(seed)
     sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
     for kept in (KEPT, 0.0):

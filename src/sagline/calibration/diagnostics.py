@@ -35,16 +35,14 @@ _FULLY: Final = 3  # number of the most promising changes that are fitted until 
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENARY) -> tuple[str, ...]:
-    """Likely mistakes in a log, as sentences with the next step; empty for a consistent log.
-
-    A comparison of the readings with their expected sizes detects lengths and positions in mm, and load cells in kN.
-    Then a robot similar to the given robot is fitted to about 24 rows. If no similar robot fits, the function tests
-    corrections of single mistakes. These mistakes are exchanged columns of two cables (encoders, load cells or both),
-    an encoder that counts backward, zeros with large errors, load cells or lengths up to five rows early or late, wrong
-    units (kgf, lbf, ft, in), and roll and pitch of an inclinometer with wrong signs or exchanged. The first correction
-    with a good fit is reported as the mistake. Zeros with large errors, lengths with the wrong sign, and lengths that
-    are early or late, are found only with commanded poses.
-    """
+    """Likely mistakes in a log, as sentences with the next step; empty for a consistent log."""
+    # A comparison of the readings with their expected sizes detects lengths and positions in mm, and load cells in kN.
+    # Then a robot similar to the given robot is fitted to about 24 rows. If no similar robot fits, the function tests
+    # corrections of single mistakes. These mistakes are exchanged columns of two cables (encoders, load cells or both),
+    # an encoder that counts backward, zeros with large errors, load cells or lengths up to five rows early or late,
+    # wrong units (kgf, lbf, ft, in), and roll and pitch of an inclinometer with wrong signs or exchanged. The first
+    # correction with a good fit is reported as the mistake. Zeros with large errors, lengths with the wrong sign, and
+    # lengths that are early or late, are found only with commanded poses.
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
     model = model_of(model)
@@ -309,10 +307,8 @@ def _extents(points: Array) -> Array:
 def _frame_mismatch(
     log: WinchLog, left_out: Indices, asked: Collection[str], points: tuple[Array, Array]
 ) -> str | None:
-    """Sentence about measured poses (rows `left_out`) that disagree with the lengths while all other readings fit.
-
-    points: expected and measured positions, each (N, 3) [m].
-    """
+    """Sentence about measured poses (rows `left_out`) that disagree with the lengths while all other readings fit."""
+    # points: expected and measured positions, each (N, 3) [m].
     measured = np.zeros(len(log), dtype=np.bool_)
     for read in (log.position, log.rotation):
         if read is not None:

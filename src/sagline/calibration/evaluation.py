@@ -126,11 +126,9 @@ def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[
 
 
 def _is_doubtful(chi_squared: float, free: int, readings: NDArray[np.integer], *, robust: bool) -> bool:
-    """True if the residuals are too large or too small for the deviations of the sensors.
-
-    Poses that fit badly are not counted. The expected sum of squares of a counted pose with r readings is therefore the
-    mean of a chi squared distribution that is truncated at c: r F(c; r + 2)/F(c; r).
-    """
+    """True if the residuals are too large or too small for the deviations of the sensors."""
+    # Poses that fit badly are not counted. The expected sum of squares of a counted pose with r readings is therefore
+    # the mean of a chi squared distribution that is truncated at c: r F(c; r + 2)/F(c; r).
     if free <= 0:
         return False
     cut = 0.0
@@ -150,10 +148,8 @@ def provenance_of(
 
 
 def _with_fixed_parameters(problem: FitProblem, unknowns: Sequence[Unknown]) -> FitProblem:
-    """Problem with all observable parameters: first the estimated parameters, then the fixed parameters.
-
-    The fixed parameters are all kinds that the robot has and the readings observe, with one value per cable.
-    """
+    """Problem with all observable parameters: first the estimated parameters, then the fixed parameters."""
+    # The fixed parameters are all kinds that the robot has and the readings observe, with one value per cable.
     robot = problem.robot if problem.robot.winches is not None else problem.robot.replace(winches=Winch())
     every, sensors, counted = list(unknowns), problem.sensors, problem.parameters.counted
     for name, kind in KINDS.items():
@@ -170,11 +166,9 @@ def _with_fixed_parameters(problem: FitProblem, unknowns: Sequence[Unknown]) -> 
 
 
 def _last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Array, Array]:
-    """Residuals and triangular factor at the end of a fit; wider: problem that also has the F fixed parameters.
-
-    The residuals have the shape (N, 2 m + 6) [m, N, m, rad]; a missing residual is NaN. The factor has at most P + F +
-    1 rows, one column for each of the P + F parameters, and a column for the misfit.
-    """
+    """Residuals and triangular factor at the end of a fit; wider: problem that also has the F fixed parameters."""
+    # The residuals have the shape (N, 2 m + 6) [m, N, m, rad]; a missing residual is NaN. The factor has at most P + F
+    # + 1 rows, one column for each of the P + F parameters, and a column for the misfit.
     fitted = fit.state
     machine = with_parameters(fitted.machine, wider.parameters)
     numbers = np.concatenate((fitted.numbers, wider.prior[len(fitted.numbers) :]))
@@ -192,14 +186,12 @@ def _last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Ar
 def _criticism(
     problem: FitProblem, wider: FitProblem, fit: Fit, triangle: Array, covariance: Array
 ) -> tuple[Array, tuple[Criticism, ...]]:
-    """Covariance (P, P) due to tolerances of fixed parameters (Schmidt); fixed parameters that readings contradict.
-
-    The readings contradict a fixed parameter if chi squared would fall significantly when it is estimated.
-    The test is the score test with the priors of the fixed parameters. Each kind of parameter is tested with one value
-    per cable and with one common value. Gains and biases of load cells are also tested for single cables. For each
-    kind, the test with the best information criterion (AIC) is reported. The largest reduction comes first. triangle:
-    factor of `_last_readings`; covariance: covariance of the estimated parameters.
-    """
+    """Covariance (P, P) due to tolerances of fixed parameters (Schmidt); fixed parameters that readings contradict."""
+    # The readings contradict a fixed parameter if chi squared would fall significantly when it is estimated. The test
+    # is the score test with the priors of the fixed parameters. Each kind of parameter is tested with one value per
+    # cable and with one common value. Gains and biases of load cells are also tested for single cables. For each kind,
+    # the test with the best information criterion (AIC) is reported. The largest reduction comes first. triangle:
+    # factor of `_last_readings`; covariance: covariance of the estimated parameters.
     count, parameters = len(problem.parameters.names), wider.parameters
     priors = np.zeros((count, triangle.shape[1]))
     priors[:, :count] = problem.parameters.prior_root

@@ -219,10 +219,8 @@ TOLERANCE: Final = 0.01  # the iteration ends if no variance changes by more, re
 
 
 def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[SensorDeviation, ...]:
-    """Standard deviation of each kind of sensor, or of each cable's sensor, computed from the residuals.
-
-    The first estimate omits poses with outliers. Later estimates include poses with small outliers.
-    """
+    """Standard deviation of each kind of sensor, or of each cable's sensor, computed from the residuals."""
+    # The first estimate omits poses with outliers. Later estimates include poses with small outliers.
     m = found.robot.cable_count
     modes = count_of_frequencies(found.sensors, m, found.residuals.shape[1])
     stated, ratios = reading_deviations(found.sensors, m, modes), dict.fromkeys(QUANTITIES, 0.0)
@@ -297,20 +295,11 @@ def _units(missing: Flags) -> Array:
 def variance_factors(
     rows: Array, noise: Array, misfit: Array, root: Array, groups: Sequence[Indices]
 ) -> tuple[Array, Array, Array]:
-    """Estimated variances divided by stated variances, for groups of errors, by restricted maximum likelihood.
-
-    The ratios are at least `FLOOR`. The method is Fisher scoring (Förstner 1979).
-
-    Args:
-        rows: Derivatives of the whitened readings of N poses by the parameters, (N, R, P).
-        noise: Effects (N, R, E) of E errors on the whitened readings; the errors have the stated variance 1.
-        misfit: Readings minus predictions at the priors, (N, R).
-        root: Root of the prior information, (P, P).
-        groups: Indices of the errors of each of G groups.
-
-    Returns:
-        Ratios (G,), relative standard errors of the deviations (G,), and redundancy numbers (G,).
-    """
+    """Estimated variances divided by stated variances, for groups of errors, by restricted maximum likelihood."""
+    # The ratios (G,) are at least `FLOOR`. The method is Fisher scoring (Förstner 1979). Relative standard errors of the
+    # deviations (G,) and redundancy numbers (G,) follow. rows: derivatives of the whitened readings, (N, R, P); noise:
+    # effects (N, R, E) of E errors with the stated variance 1 on these readings; misfit: readings minus predictions at
+    # the priors, (N, R); root: root of the prior information, (P, P).
     factors = np.ones(len(groups))
     parts, missing = [noise[:, :, group] for group in groups], _units(np.asarray(~noise.any(axis=2)))
     for _ in range(ITERATIONS):
@@ -331,10 +320,8 @@ def variance_factors(
 
 
 def _information(own: list[Array], z: Array, covariance: Array) -> tuple[Array, Array]:
-    """Traces of P U_g, shape (G,), and traces of P U_g P U_h, shape (G, G), for groups g and h of errors.
-
-    P: projection of the readings on the residuals of a fit with slopes `z`; U_g: covariance that group g causes.
-    """
+    """Traces of P U_g, shape (G,), and traces of P U_g P U_h, shape (G, G), for groups g and h of errors."""
+    # P: projection of the readings on the residuals of a fit with slopes `z`; U_g: covariance that group g causes.
     along = [np.swapaxes(part, 1, 2) @ z for part in own]
     steps = [each @ covariance for each in along]
     seen = [

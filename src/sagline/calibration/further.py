@@ -41,10 +41,8 @@ class FurtherRows(NamedTuple):
 
 
 def swivel_angles(robot: Robot, poses: Array) -> Array:
-    """Swivel angles (N, m) [rad] at pose rows: angle of the plane of each cable about its vertical swivel axis.
-
-    The angle of a cable along x is 0. A positive angle is a positive rotation about the swivel axis.
-    """
+    """Swivel angles (N, m) [rad] at pose rows: angle of the plane of each cable about its vertical swivel axis."""
+    # The angle of a cable along x is 0. A positive angle is a positive rotation about the swivel axis.
     reach = _reach(robot, poses)[0]
     return np.asarray(swivel_senses(robot) * np.arctan2(reach[..., 1], reach[..., 0]))
 
@@ -71,11 +69,10 @@ def swivel_rows(
     scale: Array,
     motion: tuple[Array, Array],
 ) -> FurtherRows:
-    """Residuals and derivatives of swivel angles.
-
-    zeros: `swivel_zero` of the cables (m,) [rad]. where, scale: as in `kernels.calibration.terms.Unknowns`. motion:
-    derivatives of origin and rotation vector of the platform by the parameters (N, 6, P) and by the lengths (N, 6, m).
-    """
+    """Residuals and derivatives of swivel angles."""
+    # zeros: `swivel_zero` of the cables (m,) [rad]. where, scale: as in `kernels.calibration.terms.Unknowns`. motion:
+    # derivatives of origin and rotation vector of the platform by the parameters (N, 6, P) and by the lengths (N, 6,
+    # m).
     (reach, levers, matrix), m = _reach(robot, poses), robot.cable_count
     square = reach[..., 0] ** 2 + reach[..., 1] ** 2
     by_end = np.zeros(reach.shape)
@@ -154,11 +151,9 @@ def frequency_rows(
     paid: Array,
     steps: Array,
 ) -> FurtherRows:
-    """Residuals and derivatives of the K lowest natural frequencies, matched with the readings by their order.
-
-    The derivatives are central differences between equilibria. paid: derivatives of the lengths by the parameters
-    (N, m, P). steps: of the P parameters. Other arguments: as in `swivel_rows`.
-    """
+    """Residuals and derivatives of the K lowest natural frequencies, matched with the readings by their order."""
+    # The derivatives are central differences between equilibria. paid: derivatives of the lengths by the parameters (N,
+    # m, P). steps: of the P parameters. Other arguments: as in `swivel_rows`.
     (count, modes), m, width = readings.shape, lengths.shape[1], paid.shape[2]
     rows = np.flatnonzero(~np.isnan(readings).all(axis=1) & np.isfinite(lengths).all(axis=1))
     found = FurtherRows(np.full((count, modes), np.nan), np.zeros((count, modes, width)), np.zeros((count, modes, m)))
@@ -232,11 +227,9 @@ def circular_mean(angles: Array) -> float:
 def whitened_further(
     rows: FurtherRows, deviation: Array, off: Array, variance: Array, before: tuple[Array, Array, Array]
 ) -> tuple[Array, Array, Array]:
-    """Whitened slopes (N, E, P), misfit (N, E) and effect on true lengths (N, m, E) of further readings.
-
-    deviation: standard deviations (E,). off: reported minus true lengths (N, m) [m]; variance: of reported lengths (m,)
-    [m^2]. before: whitened slopes, misfit and effect on true lengths of the other readings.
-    """
+    """Whitened slopes (N, E, P), misfit (N, E) and effect on true lengths (N, m, E) of further readings."""
+    # deviation: standard deviations (E,). off: reported minus true lengths (N, m) [m]; variance: of reported lengths
+    # (m,) [m^2]. before: whitened slopes, misfit and effect on true lengths of the other readings.
     matrix, misfit, back = before
     read = ~np.isnan(rows.residual) & ~np.isnan(misfit).any(axis=1, keepdims=True)
     by_length = np.where(read[..., None], rows.by_length, 0.0)

@@ -86,12 +86,10 @@ class Trial:
     found: dict[tuple[Hypothesis, int], Pose] = field(default_factory=dict)
 
     def result(self, change: Hypothesis) -> tuple[float, float, Array]:
-        """Fit of a similar robot to the changed readings: quality, departure, and errors of the zeros [m], (m,).
-
-        The quality is the sum of squares per reading, as a median over the rows: about 1 if a robot fits within the
-        deviations of the sensors, infinite if no robot fits. The departure is the mean square of the distance of the
-        parameters from their priors, in prior deviations.
-        """
+        """Fit of a similar robot to the changed readings: quality, departure, and errors of the zeros [m], (m,)."""
+        # The quality is the sum of squares per reading, as a median over the rows: about 1 if a robot fits within the
+        # deviations of the sensors, infinite if no robot fits. The departure is the mean square of the distance of the
+        # parameters from their priors, in prior deviations.
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))

@@ -30,10 +30,8 @@ _NAMED: Final = 3  # largest number of parameters that the text of a direction n
 
 
 def append_rows(triangle: Array, matrix: Array) -> Array:
-    """Triangular factor (at most P, P) of the rows of `triangle` and `matrix` (..., P); rows with NaN are omitted.
-
-    Householder reflections keep all digits of small singular values; normal equations would lose half of the digits.
-    """
+    """Triangular factor (at most P, P) of the rows of `triangle` and `matrix` (..., P); rows with NaN are omitted."""
+    # Householder reflections keep all digits of small singular values; normal equations would lose half of the digits.
     rows = matrix.reshape(-1, matrix.shape[-1])
     rows = rows[~np.isnan(rows).any(axis=1) & rows.any(axis=1)]
     return np.asarray(np.linalg.qr(np.vstack((triangle, rows)), mode="r"))
@@ -116,11 +114,9 @@ def _symmetric_part(
 def _admissible_symmetries(
     frame: PriorUnits, where: Indices, table: Array, lengths: Array, matters: Flags
 ) -> tuple[Array, Array]:
-    """Combinations of g symmetries that change only unknowns, as vectors (P, k) and as coefficients (g, k).
-
-    Vectors and coefficients are in standard deviations. Known values stay constant, and values that all cables share
-    change equally. Length zeros and drum radii change so that the drums pay out the required lengths.
-    """
+    """Combinations of g symmetries that change only unknowns, as vectors (P, k) and as coefficients (g, k)."""
+    # Vectors and coefficients are in standard deviations. Known values stay constant, and values that all cables share
+    # change equally. Length zeros and drum radii change so that the drums pay out the required lengths.
     free = np.isin(where, frame.free)
     conditions = [table[matters & ~free], lengths]
     single = np.zeros((len(frame.scale), table.shape[-1]))
@@ -284,13 +280,11 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
 def symmetries(
     robot: Robot, sensors: Sensors, turn: Array, *, counted: bool
 ) -> tuple[tuple[Generator, ...], Array, Array, Flags]:
-    """Symmetries of a robot and its sensors, including changes of length zeros, drum radii and length scales.
-
-    The argument `turn` is the rotation vector (3,) of the measuring system [rad]. Returns the symmetries with a name,
-    and three arrays. Array 1, (KIND_ROWS, m, g), is the change of each row of `kinds` by each of g symmetries. Array 2,
-    (2 m, g), is the length that the drums pay out minus the required length, zero for admissible combinations. Array 3,
-    (KIND_ROWS, m), is True for parameters that are constant if known.
-    """
+    """Symmetries of a robot and its sensors, including changes of length zeros, drum radii and length scales."""
+    # The argument `turn` is the rotation vector (3,) of the measuring system [rad]. Returns the symmetries with a name,
+    # and three arrays. Array 1, (KIND_ROWS, m, g), is the change of each row of `kinds` by each of g symmetries. Array
+    # 2, (2 m, g), is the length that the drums pay out minus the required length, zero for admissible combinations.
+    # Array 3, (KIND_ROWS, m), is True for parameters that are constant if known.
     m, each = robot.cable_count, tuple(_generators(robot, sensors, turn))
     drums = np.zeros((kinds.KIND_ROWS, m, 3 * m))
     for k, row in enumerate((kinds.ZERO, kinds.DRUM, kinds.SCALE)):

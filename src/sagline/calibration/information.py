@@ -77,14 +77,11 @@ def prior_information(rows: Array, root: Array) -> Array:
 
 
 def choose_informative(rows: Array, known: Array, count: int) -> tuple[Indices, Array, Array]:
-    """D-optimal choice of `count` candidates by a greedy algorithm; exchanges improve a choice of few candidates.
-
-    Returns the indices of the chosen candidates, the most informative candidate first. Also returns the
-    increase of the log det (count,) and the deviations (count, P); row k - 1 is for the first k candidates.
-
-    The greedy algorithm reaches at least 1 - 1/e of the largest possible increase of the log det, because the log det
-    is submodular (Nemhauser, Wolsey & Fisher 1978). The exchanges follow Fedorov 1972.
-    """
+    """D-optimal choice of `count` candidates by a greedy algorithm; exchanges improve a choice of few candidates."""
+    # Returns the indices of the chosen candidates, the most informative candidate first. Also returns the increase of
+    # the log det (count,) and the deviations (count, P); row k - 1 is for the first k candidates.
+    # The greedy algorithm reaches at least 1 - 1/e of the largest possible increase of the log det, because the log det
+    # is submodular (Nemhauser, Wolsey & Fisher 1978). The exchanges follow Fedorov 1972.
     found = Information(rows, known)
     for _ in range(count):
         found.take(found.best()[0])
@@ -110,10 +107,8 @@ def _exchange(found: Information) -> None:
 
 
 def deviations_of(rows: Array, held: Array, root: Array) -> Array:
-    """Standard deviations (P,) of the parameters; infinite for unobserved parameters.
-
-    rows: whitened slopes; held: inverse prior deviations (P,); root: `correlation_root` (P, P).
-    """
+    """Standard deviations (P,) of the parameters; infinite for unobserved parameters."""
+    # rows: whitened slopes; held: inverse prior deviations (P,); root: `correlation_root` (P, P).
     whole = np.concatenate((rows.reshape(-1, len(held)), root * held))
     _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # J^T J would square the condition number
     there = size > OPEN * size[0]
@@ -228,10 +223,8 @@ def _measured_positions(situation: Situation) -> Iterator[Option]:
 def _best_subset(
     situation: Situation, rows: Array, beside: Array, words: dict[int, str], instead: Array | None = None
 ) -> Iterator[Option]:
-    """Most informative sets of measurements; the keys of `words` are the numbers of measurements in a set.
-
-    rows: whitened slopes of each measurement alone; beside: rows to add for a measurement; instead: rows to replace.
-    """
+    """Most informative sets of measurements; the keys of `words` are the numbers of measurements in a set."""
+    # rows: whitened slopes of each measurement alone; beside: rows to add for a measurement; instead: rows to replace.
     found = Information(rows, situation.information)
     for _ in range(min(max(words), len(rows))):
         found.take(found.best()[0])

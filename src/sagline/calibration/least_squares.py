@@ -46,12 +46,10 @@ def whitened_at(
     *,
     free_of_noise: bool = False,
 ) -> WhitenedRows:
-    """Whitened readings and their derivatives, for the poses in the slice `part`; reported: lengths (n, m) [m].
-
-    If `direction` (P,) is given, only the slopes along this direction are computed. With `free_of_noise`, the slopes
-    are computed at the true lengths: at the reported lengths, the common scale of all lengths would seem observable,
-    because the scale also multiplies the noise.
-    """
+    """Whitened readings and their derivatives, for the poses in the slice `part`; reported: lengths (n, m) [m]."""
+    # If `direction` (P,) is given, only the slopes along this direction are computed. With `free_of_noise`, the slopes
+    # are computed at the true lengths: at the reported lengths, the common scale of all lengths would seem observable,
+    # because the scale also multiplies the noise.
     machine = state.machine
     at = state.lengths[part] if free_of_noise else reported
     slopes = problem.winch_slopes(machine, at, part, counted=not free_of_noise)
@@ -114,11 +112,9 @@ def predict_state(
     part: slice,
     share: float = 1.0,
 ) -> tuple[Array, Array]:
-    """First-order prediction of true lengths [m] and pose rows after the `share` of a step (P,), for the poses `part`.
-
-    known: stored whitened readings before the step, or None. machine, reported (n, m) [m]: values after the share of
-    the step. The change of the true lengths is the `share` of their change after a whole step.
-    """
+    """First-order prediction of true lengths [m] and pose rows after a `share` of a step (P,), for the poses `part`."""
+    # known: stored whitened readings before the step, or None. machine, reported (n, m) [m]: values after the share of
+    # the step. The change of the true lengths is the `share` of their change after a whole step.
     was = problem.reported_lengths(before.machine, part)
     off = before.lengths[part] - was
     if known is not None:
@@ -141,11 +137,9 @@ def evaluate_step(
     progress: Progress | None = None,
     share: float = 1.0,
 ) -> Evaluated:
-    """One pass over the log: solve every pose after a share of a step, and sum the normal equations.
-
-    Without a step of the parameters, the state itself is evaluated. Poses with a sum of squares above `scale` times the
-    expected value have less weight. Raises an error if the parameters are invalid for the robot.
-    """
+    """One pass over the log: solve every pose after a share of a step, and sum the normal equations."""
+    # Without a step of the parameters, the state itself is evaluated. Poses with a sum of squares above `scale` times
+    # the expected value have less weight. Raises an error if the parameters are invalid for the robot.
     numbers = before.numbers if step is None else np.maximum(before.numbers + share * step, problem.least)
     machine = before.machine if step is None else problem.machine_at(numbers)
     count, width = len(before.poses), len(numbers)
@@ -202,12 +196,10 @@ def solve(
     tolerance: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Fit:
-    """Gauss-Newton search that starts at the state `current`; each step is halved until the sum of squares falls.
-
-    The search has converged if the predicted decrease is below the tolerance, or if slack cables, whose slopes jump,
-    have slowed it down: the decrease in `SLOW_STEPS` steps is below `SLOW`. With `robust`, a pose that fits worse
-    than the other poses has less weight. The weights depend on a scale of the misfit, which falls during the search.
-    """
+    """Gauss-Newton search that starts at the state `current`; each step is halved until the sum of squares falls."""
+    # The search has converged if the predicted decrease is below the tolerance, or if slack cables, whose slopes jump,
+    # have slowed it down: the decrease in `SLOW_STEPS` steps is below `SLOW`. With `robust`, a pose that fits worse
+    # than the other poses has less weight. The weights depend on a scale of the misfit, which falls during the search.
     scale, promised, costs = np.inf, np.inf, list[float]()
     if robust:
         first = max(misfit(current[1]), 1.0)
@@ -244,10 +236,8 @@ def solve(
 
 
 def best_step(problem: FitProblem, state: SearchState, normal: Normal) -> tuple[Array, float]:
-    """Gauss-Newton step (P,) of the internal parameters within their bounds, and predicted decrease of the squares.
-
-    The step is zero along directions with neither observations nor a prior.
-    """
+    """Gauss-Newton step (P,) of the internal parameters within their bounds, and predicted decrease of the squares."""
+    # The step is zero along directions with neither observations nor a prior.
     scale = problem.scale
     root = problem.parameters.prior_root * scale
     downhill = scale * normal.gradient - root.T @ problem.parameters.missed(state.numbers)

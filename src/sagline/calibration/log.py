@@ -120,10 +120,8 @@ def measures_yaw(sensors: Sensors) -> bool:
 
 
 def reading_deviations(sensors: Sensors, cables: int, frequencies: int = 0) -> Array:
-    """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite for a missing sensor.
-
-    With swivel angles, their deviations (m,) follow, then those of the measured natural frequencies.
-    """
+    """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite for a missing sensor."""
+    # With swivel angles, their deviations (m,) follow, then those of the measured natural frequencies.
     parts = [
         (sensors.length_deviation, cables),
         (sensors.tension_deviation, cables),

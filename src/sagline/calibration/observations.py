@@ -174,10 +174,8 @@ def with_unit_sensors(machine: MachineTerms) -> MachineTerms:
 
 
 def winch_slopes(machine: MachineTerms, lengths: Array, counts: Array | None = None) -> Array:
-    """Derivatives of reported lengths (N, m) [m] by the unknowns of `SLOPES`, (5, N, m); zero for clock_offset.
-
-    counts: read counts (N, m); None to compute the counts from the lengths.
-    """
+    """Derivatives of reported lengths (N, m) [m] by the unknowns of `SLOPES`, (5, N, m); zero for clock_offset."""
+    # counts: read counts (N, m); None to compute the counts from the lengths.
     slopes = np.zeros((SLOPES, *lengths.shape))
     if machine.drums is None:
         slopes[0], slopes[3] = 1.0, (lengths - machine.offset) / machine.scale
@@ -215,11 +213,9 @@ def whitened_rows(
     direction: Array | None = None,
     further: FurtherReadings | None = None,
 ) -> WhitenedRows:
-    """Whitened readings and derivatives at equilibria; NaN where the equilibrium is not stable.
-
-    slopes: derivatives of reported lengths (5, N, m) from `winch_slopes`. If `direction` (P,) is given, only the slopes
-    along this direction are computed, so that P is 1 in the result.
-    """
+    """Whitened readings and derivatives at equilibria; NaN where the equilibrium is not stable."""
+    # slopes: derivatives of reported lengths (5, N, m) from `winch_slopes`. If `direction` (P,) is given, only the
+    # slopes along this direction are computed, so that P is 1 in the result.
     found = _observed(machine, readings, slopes, poses, lengths, direction)
     if further is None:
         return found
@@ -321,10 +317,8 @@ def _observed(
 def predicted_rows(
     machine: MachineTerms, poses: Array, lengths: Array, frequencies: Array | None = None
 ) -> WhitenedRows:
-    """Whitened slopes of the readings at equilibria with pose rows `poses` and unstrained lengths (N, m) [m].
-
-    frequencies: (N, K), NaN where no slopes are wanted, or None.
-    """
+    """Whitened slopes of the readings at equilibria with pose rows `poses` and unstrained lengths (N, m) [m]."""
+    # frequencies: (N, K), NaN where no slopes are wanted, or None.
     more = machine.sensors.swivel_deviation is not None or frequencies is not None
     further = FurtherReadings(None, frequencies) if more else None
     slopes, readings = winch_slopes(machine, lengths), _no_readings(lengths)
@@ -335,10 +329,8 @@ def predicted_rows(
 def unwhitened_slopes(
     machine: MachineTerms, poses: Array, lengths: Array, frequencies: Array | None = None
 ) -> tuple[Array, Array]:
-    """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths.
-
-    The derivatives of swivel angles follow in m more rows, then those of frequencies (N, K), if given.
-    """
+    """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths."""
+    # The derivatives of swivel angles follow in m more rows, then those of frequencies (N, K), if given.
     (count, m), machine = lengths.shape, with_unit_sensors(machine)
     width = len(reading_deviations(machine.sensors, m, 0 if frequencies is None else frequencies.shape[1])) - m
     by_values, by_length = np.empty((count, width, len(machine.slopes))), np.empty((count, width, m))

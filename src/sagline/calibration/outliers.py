@@ -71,10 +71,8 @@ class _Case(NamedTuple):
         return 0 if given is None else given.shape[1]
 
     def misses(self) -> tuple[Array, Array]:
-        """Misfits (2 m + 6,) of lengths and readings, and derivatives (m + 6, m) of readings by true lengths.
-
-        For straight cables: derivatives (2 m + 6, n) of lengths and readings by the free motions of the platform.
-        """
+        """Misfits (2 m + 6,) of lengths and readings, and derivatives (m + 6, m) of readings by true lengths."""
+        # For straight cables: derivatives (2 m + 6, n) of lengths and readings by the free motions of the platform.
         m = self.lengths.shape[1]
         if self.machine.model.code == codes.STRAIGHT:
             lines = lines_at(self.machine, self.readings, self.pose)
@@ -178,12 +176,10 @@ def misfitting(squares: Array, readings: NDArray[np.integer]) -> Indices:
 def outliers_in(
     problem: FitProblem, state: SearchState, which: Indices, rows: Indices, *, count: int
 ) -> tuple[Outlier, ...]:
-    """Outliers that explain the misfit at the poses `which`, in the order of the rows of the log.
-
-    At each pose, an error of every length, load cell, measured position and rotation is fitted. The outlier is the
-    error that explains most of the misfit. Further outliers explain the remaining misfit. If several cables or no cable
-    can explain the misfit, the whole pose is the outlier.
-    """
+    """Outliers that explain the misfit at the poses `which`, in the order of the rows of the log."""
+    # At each pose, an error of every length, load cell, measured position and rotation is fitted. The outlier is the
+    # error that explains most of the misfit. Further outliers explain the remaining misfit. If several cables or no
+    # cable can explain the misfit, the whole pose is the outlier.
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = problem.reported_lengths(machine)
     modes = 0 if log.frequencies is None else log.frequencies.shape[1]

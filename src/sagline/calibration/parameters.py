@@ -209,10 +209,8 @@ _NOTHING: Final = {"dead_cable": "0 m", "pulley_radius": "0 m"}
 
 
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
-    """Parameters in the order of `unknowns`; the parameters of each unknown are sorted by cable and axis.
-
-    Raises an error if an unknown is repeated, has no value in the robot, or has neither readings nor a stated prior.
-    """
+    """Parameters in the order of `unknowns`; the parameters of each unknown are sorted by cable and axis."""
+    # Raises an error if an unknown is repeated, has no value in the robot, or has neither readings nor a stated prior.
     m = robot.cable_count
     where = np.full((kinds.KIND_ROWS, m), -1, dtype=np.int64)
     rows: list[tuple[str, str, str, int, float, float, bool, bool]] = []
@@ -383,10 +381,8 @@ class PriorUnits(NamedTuple):
 
 
 def prior_units(parameters: Parameters) -> PriorUnits:
-    """Unit of each parameter: its prior deviation or, without a prior, the usual deviation of an unknown value.
-
-    A unit is at most `_WIDE` usual deviations, because rounding would otherwise hide the other parameters.
-    """
+    """Unit of each parameter: its prior deviation or, without a prior, the usual deviation of an unknown value."""
+    # A unit is at most `_WIDE` usual deviations, because rounding would otherwise hide the other parameters.
     size = np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
     usual = parameters.usual_deviation * size
     units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)

@@ -106,10 +106,8 @@ class FitProblem(NamedTuple):
 
     @property
     def scale(self) -> Array:
-        """Scale (P,) of each internal parameter: its prior deviation or its usual deviation, whichever is smaller.
-
-        With a larger scale, rounding errors would hide the sums of squares of well-observed parameters.
-        """
+        """Scale (P,) of each internal parameter: its prior deviation or its usual deviation, whichever is smaller."""
+        # With a larger scale, rounding errors would hide the sums of squares of well-observed parameters.
         return np.asarray(np.fmin(self.parameters.internal_deviation, self.parameters.usual_deviation))
 
     @property
@@ -181,11 +179,9 @@ Evaluated = tuple[SearchState, Normal]
 
 
 def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
-    """Initial state: prior values, and poses that are measured, commanded or computed from the reported lengths.
-
-    The true lengths are computed from these poses and the measured tensions. The reported lengths would give wrong
-    tensions, because an anchor error of one millimeter changes the tension of a steel cable by about 90 N.
-    """
+    """Initial state: prior values, and poses that are measured, commanded or computed from the reported lengths."""
+    # The true lengths are computed from these poses and the measured tensions. The reported lengths would give wrong
+    # tensions, because an anchor error of one millimeter changes the tension of a steel cable by about 90 N.
     numbers = problem.prior
     offset = problem.parameters.length_offset(problem.parameters.prior)
     machine = machine_of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
@@ -222,11 +218,9 @@ def with_swivel_zeros(problem: FitProblem, numbers: Array, poses: Array) -> Arra
 def held_lengths(
     problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array, *, balanced: bool = False
 ) -> Array:
-    """Unstrained lengths [m] from poses and measured tensions; the reported length where a tension is missing.
-
-    With `balanced`, or if reported lengths are relative, a missing tension is the cable's share of the weight or its
-    lower limit, whichever is larger.
-    """
+    """Unstrained lengths [m] from poses and measured tensions; the reported length where a tension is missing."""
+    # With `balanced`, or if reported lengths are relative, a missing tension is the cable's share of the weight or its
+    # lower limit, whichever is larger.
     balanced = balanced or problem.relative
     if problem.sensors.tension_deviation is None and not balanced:
         return reported.copy()

@@ -26,22 +26,17 @@ OTHERWISE: Final = 0.5  # rows without a reading of a load cell are omitted if m
 def screen(
     robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT, usable: Flags | None = None
 ) -> tuple[WinchLog, Indices, Mapping[Omission, Indices]]:
-    """Log with the rows that have all readings, a platform at rest and taut cables, without repeated rows.
-
-    Also returns the indices (N,) of the kept rows, and the indices of the omitted rows for each reason. A row is
-    omitted for the first of these reasons that applies:
-
-    - a count or length is missing, or a reading of a load cell that has readings in more than half of the rows
-      (measured positions and rotations may be missing);
-    - its readings are exactly the readings of an earlier row;
-    - a length changes faster than `speed_limit` [m/s] between the row and the nearest row in time, 0.1 s to 1 s away
-      (not checked for a log without times);
-    - a load cell reading minus bias is at most three standard deviations, so that the cable may be slack.
-
-    The last two reasons do not apply to the rows with `usable` True, (N,).
-
-    Raises an error if the log has a wrong number of cables, or the robot cannot convert its counts to lengths.
-    """
+    """Log with the rows that have all readings, a platform at rest and taut cables, without repeated rows."""
+    # Also returns the indices (N,) of the kept rows, and the indices of the omitted rows for each reason. A row is
+    # omitted for the first of these reasons that applies:
+    # - a count or length is missing, or a reading of a load cell that has readings in more than half of the rows
+    #   (measured positions and rotations may be missing);
+    # - its readings are exactly the readings of an earlier row;
+    # - a length changes faster than `speed_limit` [m/s] between the row and the nearest row in time, 0.1 s to 1 s away
+    #   (not checked for a log without times);
+    # - a load cell reading minus bias is at most three standard deviations, so that the cable may be slack.
+    # The last two reasons do not apply to the rows with `usable` True, (N,).
+    # Raises an error if the log has a wrong number of cables, or the robot cannot convert its counts to lengths.
     limit = float(exactly(speed_limit, "speed_limit", "m/s", (), above=0.0, infinite=True))
     lengths = lengths_of(robot, log)
     found: dict[Omission, Indices] = {}
@@ -111,10 +106,8 @@ def _repeated(log: WinchLog) -> Flags:
 
 
 def moving_rows(robot: Robot, log: WinchLog) -> tuple[Flags, Array]:
-    """Moving rows (N,) with a measured pose; speed [m/s] and acceleration [m/s^2] of reported lengths, (2, N, m).
-
-    They are differences to the nearest rows in time, 0.1 s to 1 s away on both sides; zero for all other rows.
-    """
+    """Moving rows (N,) with a measured pose; speed [m/s] and acceleration [m/s^2] of reported lengths, (2, N, m)."""
+    # They are differences to the nearest rows in time, 0.1 s to 1 s away on both sides; zero for all other rows.
     lengths, read = lengths_of(robot, log), [v for v in (log.position, log.rotation) if v is not None]
     measured = np.zeros(len(log), dtype=np.bool_) if log.time is None else _moving(log, lengths, SPEED_LIMIT)
     motion = np.zeros((2, *lengths.shape))

@@ -37,11 +37,9 @@ def search_from_priors(
     robust: bool,
     progress: Progress | None = None,
 ) -> tuple[Fit, Flags, dict[Omission, Indices]]:
-    """Search that starts at the priors. A pose that converges to another equilibrium is restarted once, then omitted.
-
-    If the initial state `other` has smaller squares, the search starts there. Returns the last fit, the flags of the
-    used poses (N,), and the indices of the omitted poses by reason.
-    """
+    """Search from the priors. A pose that converges to another equilibrium is restarted once, then omitted."""
+    # If the initial state `other` has smaller squares, the search starts there. Returns the last fit, the flags of the
+    # used poses (N,), and the indices of the omitted poses by reason.
     state = start_of(problem, commanded)
     kept = np.ones(len(state.poses), dtype=np.bool_)
     current = evaluate_step(problem, state, None, kept)
@@ -133,11 +131,9 @@ def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) ->
 def cross_validate(
     problem: FitProblem, found: Fit, kept: Flags, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
-    """Cross-validation: calibrate without a part of the poses and predict the readings of this part, for each part.
-
-    A part consists of consecutive poses, so that all sets of tensions at one pose are in one part. Returns None if
-    there are fewer than two poses.
-    """
+    """Cross-validation: calibrate without a part of the poses and predict the readings of this part, for each part."""
+    # A part consists of consecutive poses, so that all sets of tensions at one pose are in one part. Returns None if
+    # there are fewer than two poses.
     places = np.flatnonzero(kept)
     folds = min(folds, len(places))
     if folds < 2:

@@ -84,10 +84,8 @@ def _deviations(machine: MachineTerms) -> Array:
 
 
 def _weights(machine: MachineTerms, lines: _Lines) -> Array:
-    """Inverse standard deviations of the readings (N, m + 6); 0 for a missing reading.
-
-    Rotations that the platform cannot make are not used.
-    """
+    """Inverse standard deviations of the readings (N, m + 6); 0 for a missing reading."""
+    # Rotations that the platform cannot make are not used.
     m = machine.robot.cable_count
     used = ~np.isnan(lines.residual)
     used[:, m + 3 :] &= lines.by_pose[:, m + 3 :].any(axis=2)
@@ -167,10 +165,8 @@ def _by_row(flags: Flags, array: Array) -> Flags:
 
 
 def _slopes(machine: MachineTerms, lines: _Lines, reported: Array) -> Array:
-    """Derivatives (N, m + 6, P) of the residuals by the unknowns, at constant poses.
-
-    reported: derivatives of reported lengths (5, N, m) from `winch_slopes`.
-    """
+    """Derivatives (N, m + 6, P) of the residuals by the unknowns, at constant poses."""
+    # reported: derivatives of reported lengths (5, N, m) from `winch_slopes`.
     m, where = machine.robot.cable_count, machine.parameters.where
     found = np.zeros((*lines.residual.shape, len(machine.slopes)))
     free = machine.robot.freedom[:, :3]
@@ -205,11 +201,9 @@ def _by_cable(lines: _Lines, along: Array, reported: Array) -> Iterator[tuple[in
 
 
 def straight_rows(machine: MachineTerms, readings: PoseReadings, reported: Array, poses: Array) -> WhitenedRows:
-    """Whitened rows at the poses; zero along the directions that the pose explains, which are eliminated.
-
-    reported: derivatives of reported lengths (5, N, m) from `winch_slopes`. `back` are the directions of the rows,
-    (N, m + 6, m + 6), and `motion` is empty.
-    """
+    """Whitened rows at the poses; zero along the directions that the pose explains, which are eliminated."""
+    # reported: derivatives of reported lengths (5, N, m) from `winch_slopes`. `back` are the directions of the rows,
+    # (N, m + 6, m + 6), and `motion` is empty.
     fitted = _fitted_at(machine, readings, poses)
     count, size = fitted.misfit.shape
     m, weights = machine.robot.cable_count, _weights(machine, fitted.lines)

@@ -372,12 +372,10 @@ def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors)
 
 
 def without_motion(points: Array, which: Anchors) -> Array:
-    """Matrix (3 m, 3 m) that removes the common rigid motion from small changes of anchors `points` (m, 3).
-
-    The matrix removes shifts and unobservable rotations: for frame anchors, the rotation about the vertical; for
-    platform anchors, all rotations, because the platform anchors define the platform frame. The method is an
-    S-transformation with equal weights of all anchors (Baarda 1973).
-    """
+    """Matrix (3 m, 3 m) that removes the common rigid motion from small changes of anchors `points` (m, 3)."""
+    # The matrix removes shifts and unobservable rotations: for frame anchors, the rotation about the vertical; for
+    # platform anchors, all rotations, because the platform anchors define the platform frame. The method is an
+    # S-transformation with equal weights of all anchors (Baarda 1973).
     m = len(points)
     ways = [np.tile(axis, m) for axis in np.eye(3)]
     ways += [np.cross(np.eye(3)[axis], points - points.mean(axis=0)).reshape(-1) for axis in _TURNS[which]]

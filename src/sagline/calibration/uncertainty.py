@@ -90,10 +90,8 @@ def _parameters(robot: Robot, errors: Mapping[str, Array]) -> Parameters:
 
 
 def _add_moments(state: Equilibrium, slopes: Array) -> None:
-    """Add the effect of external moments, which make the stiffness K unsymmetric, to the derivatives (N, m + 6, P).
-
-    With the symmetric part S of K, S x' = K x gives x = x' - K^-1 (K - S) x'. The skew part acts on rotations only.
-    """
+    """Add the effect of external moments, which make the stiffness K unsymmetric, to the derivatives (N, m + 6, P)."""
+    # With the symmetric part S of K, S x' = K x gives x = x' - K^-1 (K - S) x'. The skew part acts on rotations only.
     if not state.wrench[..., 3:].any():
         return
     robot, m = state.one_robot, state.one_robot.cable_count

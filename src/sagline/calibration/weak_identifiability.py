@@ -25,12 +25,10 @@ Groups = dict[str, Indices]  # name of a kind and axis, such as "frame_anchors z
 
 
 def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direction, ...]) -> tuple[Direction, ...]:
-    """Weakly identifiable directions, without the unobservable directions.
-
-    The result begins with directions that keep more than the share `LITTLE` of the prior deviation, the largest share
-    first. Next are pairs of parameters with a correlation above `ALIKE`. The last are single parameters that change the
-    readings as a combination of parameters of all cables does.
-    """
+    """Weakly identifiable directions, without the unobservable directions."""
+    # The result begins with directions that keep more than the share `LITTLE` of the prior deviation, the largest share
+    # first. Next are pairs of parameters with a correlation above `ALIKE`. The last are single parameters that change
+    # the readings as a combination of parameters of all cables does.
     frame = prior_units(parameters)
     complement = _complement(frame, gauge)
     if not complement.shape[1]:
@@ -89,10 +87,8 @@ def _little_observed(
 
 
 def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices, member: Array) -> tuple[str, ...]:
-    """Names for the direction `vector` (P,), one for each of its main kinds of parameters.
-
-    kinds: index (P,) of each parameter's kind; member: matrix (g, P) with 1 for each parameter of a group.
-    """
+    """Names for the direction `vector` (P,), one for each of its main kinds of parameters."""
+    # kinds: index (P,) of each parameter's kind; member: matrix (g, P) with 1 for each parameter of a group.
     square = vector**2
     shares = np.bincount(kinds, square, minlength=kinds.max() + 1)
     order = np.argsort(-shares, kind="stable")

@@ -30,13 +30,11 @@ SMALL: Final = 0.02  # largest change of a cable length, as a share of the lengt
 
 
 def _modal_model(state: Equilibrium, damping: Damping) -> tuple[Vibration, Array, Array, Array, Array]:
-    """Modes of `state`, and their response to changes u = (dL, dw) of lengths and wrench, shape (m + 6,).
-
-    Returns:
-        Modes; modal force per unit of u, (K, m + 6); static platform motion due to u minus the static response of the
-        modes, (6, m + 6); frame-end tensions per modal amplitude, (m, K) [N/(m sqrt(kg))]; static tensions due to u
-        minus the static response of the modes, (m, m + 6).
-    """
+    """Modes of `state`, and their response to changes u = (dL, dw) of lengths and wrench, shape (m + 6,)."""
+    # Returns: Modes; modal force per unit of u, (K, m + 6); static platform motion due to u minus the static response
+    # of the modes, (6, m + 6); frame-end tensions per modal amplitude, (m, K) [N/(m sqrt(kg))]; static tensions due to
+    # u minus the static response of the modes, (m, m + 6).
+    #
     # source: docs/model.md, section 11
     found = vibration(state, up_to=UP_TO * float(np.nanmax(modes(state).frequency)), damping=damping)
     if found.status is not VibrationStatus.SOLVED:

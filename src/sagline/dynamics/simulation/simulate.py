@@ -213,11 +213,10 @@ def initial_plant(
     with_wind: bool = False,
     spare: float = 1.0,
 ) -> tuple[Plant, tuple[int, int, int, int, int], float, Damping]:
-    """Check the options, and create the plant at its first step, with winches at their initial speeds.
-
-    `spare`: factor of the lengths up to which drums remember their winding. Returns the plant, the rules of the kernel
-    (codes of integrator and winches, remembered winding, loads, steps per period), the time step [s] and the losses.
-    """
+    """Check the options, and create the plant at its first step, with winches at their initial speeds."""
+    # `spare`: factor of the lengths up to which drums remember their winding. Returns the plant, the rules of the
+    # kernel (codes of integrator and winches, remembered winding, loads, steps per period), the time step [s] and the
+    # losses.
     kind, losses = winch_kind(winches), _checked_damping(damping)
     code, remembered = _integrator_code(integrator, kind, elements), checked_winding(winding, kind) == "remembered"
     length = given.state.unstrained_length
@@ -318,11 +317,10 @@ def highest_frequency(
     lightness: float = 1.0,
     frames: Array | None = None,
 ) -> float:
-    """Highest angular frequency of platform and winches as a coupled system [rad/s].
-
-    `lightness`: factor of the platform frequency for a smaller mass. `frames`: frame anchors at the poses; None for
-    those of the robot.
-    """
+    """Highest angular frequency of platform and winches as a coupled system [rad/s]."""
+    # `lightness`: factor of the platform frequency for a smaller mass. `frames`: frame anchors at the poses; None for
+    # those of the robot.
+    #
     # shapes: lengths (K, m) [m]; data (DATA_ROWS, m)
     frames = robot.frame_anchors if frames is None else frames
     platform = _platform_frequency(robot, poses, lengths, frames) * lightness

@@ -218,11 +218,9 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
 
 
 def _check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
-    """Reject `frequency` [Hz] before the exact count if the cables have far too many modes below it.
-
-    In each of two directions, N half waves of a cable have the phase pi N. This phase is the integral of omega
-    sqrt(rho/T) along the cable. The tension is T_x cosh(q) at the point with the vertical force T_x sinh(q).
-    """
+    """Reject `frequency` [Hz] before the exact count if the cables have far too many modes below it."""
+    # In each of two directions, N half waves of a cable have the phase pi N. This phase is the integral of omega
+    # sqrt(rho/T) along the cable. The tension is T_x cosh(q) at the point with the vertical force T_x sinh(q).
     table = strings.table[row, strings.taut[row]]
     level = np.maximum(table[:, columns.HORIZONTAL], _STEEP * np.abs(table[:, columns.VERTICAL]))
     top, hanging = table[:, columns.VERTICAL], table[:, columns.WEIGHT] * table[:, columns.LENGTH]
