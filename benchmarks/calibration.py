@@ -14,7 +14,7 @@ from benchmarks.measure import Row, best_seconds, print_table
 from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import best_step, evaluate_step
 from sagline.calibration.parameters import parameters_of, with_values
-from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, readings_table, start_of
+from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, start_of
 from sagline.core.arrays import Array
 from sagline.robot.drum import drums_of
 from tests.calibration.synthetic import Truth, true_robot, usual_sensors, with_drums
@@ -33,7 +33,7 @@ def problem_of(log: sl.WinchLog) -> FitProblem:
     """Unknowns of a calibration of CoGiRo with a log."""
     sensors = active_sensors(log)
     return FitProblem(
-        COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), readings_table(log)
+        COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), ReadingsTable.of(log)
     )
 
 

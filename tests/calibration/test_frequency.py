@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.calibration.observations import machine_of, unwhitened_slopes
+from sagline.calibration.observations import MachineTerms, unwhitened_slopes
 from sagline.calibration.parameters import parameters_of, with_values
 from sagline.core.arrays import Array
 from tests.calibration import reference
@@ -46,7 +46,7 @@ def test_slopes_are_those_of_the_equilibrium(name: str) -> None:
     size = sl.modes(sl.forward(robot, lengths, pose).state).frequency.shape[1]
     wanted = np.zeros((len(rows), size))
     by_values, by_length = unwhitened_slopes(
-        machine_of(robot, sl.Catenary(), asked, sensors), rows, lengths, frequencies=wanted
+        MachineTerms.of(robot, sl.Catenary(), asked, sensors), rows, lengths, frequencies=wanted
     )
 
     def frequencies(changed: sl.Robot, lengths: Array) -> Array:

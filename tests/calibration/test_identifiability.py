@@ -10,8 +10,8 @@ import pytest
 import sagline as sl
 from sagline.calibration.findings import Direction
 from sagline.calibration.identifiability import append_rows, gauge_of, numerical_rank
-from sagline.calibration.observations import machine_of, predicted_rows
-from sagline.calibration.parameters import KINDS, Parameters, prior_units
+from sagline.calibration.observations import MachineTerms, predicted_rows
+from sagline.calibration.parameters import KINDS, Parameters, PriorUnits
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, standing, with_drums
@@ -164,7 +164,7 @@ def by_differences(case: Case) -> Array:
     parts += [total[: case.positions, m : m + 3] / 1e-3] if case.positions else []
     parts += [total[:, m + 3 :] / 1e-3] if case.rotations else []
     rows = np.vstack([part.reshape(-1, total.shape[2]) for part in parts])
-    rows = rows * prior_units(parameters).scale
+    rows = rows * PriorUnits.of(parameters).scale
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     found: Array = (
         rows[size[:, 0] > 0.0] / size[size[:, 0] > 0.0]
@@ -180,7 +180,7 @@ def triangle_of(case: Case) -> Array:
         read = given or (sensors if case.positions in (0, POSES) else sensors.replace(position_deviation=None))
         if len(lengths[part]):
             rows = predicted_rows(
-                machine_of(machine.robot, sl.Catenary(), parameters, read), pose_rows(pose[part]), lengths[part]
+                MachineTerms.of(machine.robot, sl.Catenary(), parameters, read), pose_rows(pose[part]), lengths[part]
             )
             triangle = append_rows(triangle, rows.matrix)
     return triangle
@@ -210,7 +210,7 @@ def test_differences_give_the_same_unidentifiable_directions(name: str) -> None:
     values = np.concatenate((values, np.zeros(rows.shape[1] - len(values))))
     assert len(found) == np.sum(values < 1e-7 * values[0])
     vectors = np.array([one.vector for one in found]).reshape(len(found), rows.shape[1])
-    vectors = vectors / prior_units(asked(case)).units
+    vectors = vectors / PriorUnits.of(asked(case)).units
     assert np.abs(rows @ vectors.T).max(initial=0.0) < 1e-6 * values[0]
     assert np.linalg.matrix_rank(vectors, tol=1e-3) == len(found)
 
@@ -218,7 +218,7 @@ def test_differences_give_the_same_unidentifiable_directions(name: str) -> None:
 def test_63_parameters_of_the_cogiro() -> None:
     case = CASES["63 of the CoGiRo"]
     assert len(asked(case).names) == 63
-    values = np.linalg.svd(triangle_of(case) * prior_units(asked(case)).scale)[1]
+    values = np.linalg.svd(triangle_of(case) * PriorUnits.of(asked(case)).scale)[1]
     assert np.sum(values < 1e-12 * values[0]) == 11
     assert values[51] > 1e-6 * values[0]
 

@@ -9,7 +9,7 @@ from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import evaluate_step, predict_state, solve
 from sagline.calibration.log import load_cells_of
 from sagline.calibration.parameters import parameters_of, with_values
-from sagline.calibration.problem import Fit, FitProblem, ReadingsTable, SearchState, readings_table, start_of
+from sagline.calibration.problem import Fit, FitProblem, ReadingsTable, SearchState, start_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots, standing
@@ -24,7 +24,7 @@ UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot) -> FitProblem:
     sensors = active_sensors(made.log)
     parameters = parameters_of(nominal, unknowns, sensors, counted=made.log.counts is not None)
-    return FitProblem(nominal, sl.Catenary(), sensors, parameters, readings_table(made.log))
+    return FitProblem(nominal, sl.Catenary(), sensors, parameters, ReadingsTable.of(made.log))
 
 
 def fitted(problem: FitProblem, made: Synthetic, *, robust: bool = False) -> Fit:

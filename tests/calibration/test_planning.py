@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.calibration import planning
-from sagline.calibration.observations import machine_of, predicted_rows
+from sagline.calibration.observations import MachineTerms, predicted_rows
 from sagline.calibration.parameters import KINDS, parameters_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
@@ -39,7 +39,7 @@ def information_of(plan: sl.CalibrationPoses, pose: sl.Pose, lengths: Array) -> 
     numbers = plan.parameters
     unit = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
     matrix = predicted_rows(
-        machine_of(plan.robot, sl.Catenary(), numbers, plan.sensors), pose_rows(pose), lengths
+        MachineTerms.of(plan.robot, sl.Catenary(), numbers, plan.sensors), pose_rows(pose), lengths
     ).matrix
     flat = (matrix * unit).reshape(-1, len(unit))
     found: Array = flat.T @ flat
@@ -329,7 +329,7 @@ def _errors_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown]) -> Array:
     rows = pose_rows(plan.poses)
     matrix = (
         predicted_rows(
-            machine_of(plan.robot, sl.Catenary(), numbers, plan.sensors), rows, plan.unstrained_length
+            MachineTerms.of(plan.robot, sl.Catenary(), numbers, plan.sensors), rows, plan.unstrained_length
         ).matrix
         / unit
     )

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.calibration.observations import machine_of
+from sagline.calibration.observations import MachineTerms
 from sagline.calibration.parameters import parameters_of, with_values
 from sagline.calibration.result import motion_slopes
 from sagline.core.arrays import Array
@@ -216,7 +216,7 @@ def test_the_effect_of_stiffness_differs_between_counts_and_lengths(counted: boo
     plan = sl.inverse(robot, commanded("drums")[0])
     lengths = np.asarray(plan.state.unstrained_length)[None]
     by_values, _ = motion_slopes(
-        machine_of(robot, sl.Catenary(), parameters, sl.Sensors()), pose_rows(plan.state.pose), lengths
+        MachineTerms.of(robot, sl.Catenary(), parameters, sl.Sensors()), pose_rows(plan.state.pose), lengths
     )
     moved = by_values[0, :3]
     believed = counts_of(robot, lengths)

@@ -9,8 +9,8 @@ import pytest
 import sagline as sl
 from sagline.calibration.findings import Direction
 from sagline.calibration.identifiability import append_rows, gauge_of
-from sagline.calibration.observations import machine_of, predicted_rows
-from sagline.calibration.parameters import Parameters, prior_units
+from sagline.calibration.observations import MachineTerms, predicted_rows
+from sagline.calibration.parameters import Parameters, PriorUnits
 from sagline.calibration.weak_identifiability import weak_directions
 from sagline.core.arrays import Array
 from tests.calibration import reference
@@ -34,12 +34,12 @@ def identified(robot: str, unknowns: tuple[str, ...], *, positions: bool = False
     shared = tuple(name for name in unknowns if name in ("pulley_radius", "axial_stiffness", "linear_density"))
     parameters = reference.parameters(machine, unknowns, shared=shared)
     matrix = predicted_rows(
-        machine_of(machine.robot, sl.Catenary(), parameters, sensors), pose_rows(pose), lengths
+        MachineTerms.of(machine.robot, sl.Catenary(), parameters, sensors), pose_rows(pose), lengths
     ).matrix
     triangle = append_rows(np.zeros((0, len(parameters.names))), matrix)
     gauge = gauge_of(triangle, parameters, parameters.prior, machine.robot, sensors)
-    rows = matrix.reshape(-1, matrix.shape[2]) * prior_units(parameters).scale
-    left = np.array([one.vector for one in gauge]).reshape(len(gauge), rows.shape[1]) / prior_units(parameters).units
+    rows = matrix.reshape(-1, matrix.shape[2]) * PriorUnits.of(parameters).scale
+    left = np.array([one.vector for one in gauge]).reshape(len(gauge), rows.shape[1]) / PriorUnits.of(parameters).units
     basis = np.linalg.qr(left.T)[0]
     outside = np.eye(rows.shape[1]) - basis @ basis.T
     scatter: Array = outside @ np.linalg.inv(rows.T @ rows + np.eye(rows.shape[1])) @ outside
@@ -84,7 +84,7 @@ def test_densities_of_ropes_and_mass_of_the_platform() -> None:
 )
 def test_remaining_share_of_the_prior(robot: str, unknowns: tuple[str, ...]) -> None:
     parameters, scatter, found = identified(robot, unknowns)
-    units = prior_units(parameters).units
+    units = PriorUnits.of(parameters).units
     for one in found:
         vector = one.vector / units
         np.testing.assert_allclose(np.linalg.norm(vector), one.known, rtol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.calibration.observations import machine_of, predicted_rows
+from sagline.calibration.observations import MachineTerms, predicted_rows
 from sagline.calibration.parameters import parameters_of
 from sagline.core.arrays import Array
 from sagline.statics.tables import pose_rows
@@ -67,7 +67,7 @@ def slopes(unknowns: tuple[str, ...]) -> tuple[Array, tuple[str, ...]]:
     for way in ways:
         plan = sl.inverse(drawn, poses[:20], tension=way)
         said = predicted_rows(
-            machine_of(drawn, sl.Catenary(), numbers, SENSORS), pose_rows(poses[:20]), plan.unstrained_length
+            MachineTerms.of(drawn, sl.Catenary(), numbers, SENSORS), pose_rows(poses[:20]), plan.unstrained_length
         )
         rows.append(said.matrix.reshape(-1, len(numbers.names)))
     return np.concatenate(rows), numbers.names

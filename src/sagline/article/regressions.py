@@ -173,7 +173,7 @@ class SagStudy:
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> tuple[sl.CableState, sl.CableState, Array, Array]:
-    """States of a cable that does not stretch and of the elastic cable, and adjusting lengths [m] without elongation."""
+    """States of a cable that does not stretch and of an elastic cable; adjusting lengths [m] without elongation."""
     # The adjusting lengths are those of the elastic cable, plus the elongation by equations (36) and (38), and plus the
     # true elongation.
     #

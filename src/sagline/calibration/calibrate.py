@@ -26,9 +26,9 @@ from sagline.calibration.parameters import (
 )
 from sagline.calibration.problem import (
     FitProblem,
+    ReadingsTable,
     SearchState,
     held_lengths,
-    readings_table,
     start_of,
     with_swivel_zeros,
 )
@@ -142,7 +142,7 @@ def calibrate(
     more = fit_log.readings.size - len(fit_log) * len(robot.freedom) if straight else 0
     _check_count(fit_log, parameters, left_out, more, freely=DEFAULT not in wanted)
     moved = None if motion is None or not motion.any() else motion[:, rows]
-    table = readings_table(fit_log)._replace(motion=moved)
+    table = ReadingsTable.of(fit_log)._replace(motion=moved)
     problem, geometric = FitProblem(robot, model, sensors, parameters, table), None
     if not straight and fit_log.load_cells is None and fit_log.position is not None:
         geometric = _geometric_start(problem, log, rows, asked)
@@ -228,7 +228,7 @@ def _with_assumed_rotations(
     """The logs, with rotations as commanded, or level, if neither lengths nor positions determine the rotations."""
     asked = checked_unknowns(unknowns, log.sensors, straight=True)
     parameters = parameters_of(robot, _with_relative_lengths(log, asked), log.sensors, counted=log.counts is not None)
-    problem = FitProblem(robot, model, log.sensors, parameters, readings_table(fit_log))
+    problem = FitProblem(robot, model, log.sensors, parameters, ReadingsTable.of(fit_log))
     state = start_of(problem, fit_log.commanded)
     readings = problem.readings(problem.reported_lengths(state.machine), slice(None))
     if "measuring_frame" in parameters.names or rotation_error(state.machine, readings, state.poses) < LEVEL:

@@ -14,7 +14,7 @@ from scipy.special import chdtr, chdtrc
 from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Omission
 from sagline.calibration.identifiability import OPEN, append_rows, gauge_of
 from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_at
-from sagline.calibration.observations import BLOCK, with_parameters
+from sagline.calibration.observations import BLOCK
 from sagline.calibration.outliers import misfitting, outliers_in
 from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, parameters_of
 from sagline.calibration.problem import Fit, FitProblem
@@ -170,7 +170,7 @@ def _last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Ar
     # The residuals have the shape (N, 2 m + 6) [m, N, m, rad]; a missing residual is NaN. The factor has at most P + F
     # + 1 rows, one column for each of the P + F parameters, and a column for the misfit.
     fitted = fit.state
-    machine = with_parameters(fitted.machine, wider.parameters)
+    machine = fitted.machine.with_parameters(wider.parameters)
     numbers = np.concatenate((fitted.numbers, wider.prior[len(fitted.numbers) :]))
     state, residuals = fitted._replace(numbers=numbers, machine=machine), []
     triangle = np.zeros((0, numbers.size + 1))

@@ -13,8 +13,8 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors, count_of_frequencies, reading_deviations
-from sagline.calibration.observations import machine_of, unwhitened_slopes, winch_slopes
-from sagline.calibration.parameters import Parameters, prior_units
+from sagline.calibration.observations import MachineTerms, unwhitened_slopes
+from sagline.calibration.parameters import Parameters, PriorUnits
 from sagline.calibration.straight import whitened_errors
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.indices import evenly_spaced
@@ -262,19 +262,19 @@ def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Arra
     """Whitened slopes (n, R, P), effects of errors (n, R, m + R), misfit (n, R) and root of the prior (P, P)."""
     m, parameters = found.robot.cable_count, found.parameters
     lengths = np.atleast_2d(found.unstrained_length)[used]
-    scale = prior_units(parameters).scale
+    scale = PriorUnits.of(parameters).scale
     step = (parameters.internal(found.values) - parameters.internal(parameters.prior)) / scale
     root = parameters.prior_root * scale
     root *= np.sqrt(len(used) / len(found.rows))  # the prior information per pose is the same as in the whole log
     if found.model.code == codes.STRAIGHT:
         numbers = found.length_offset, parameters.of_cables(found.values, kinds.SCALE, 1.0)
-        machine = machine_of(found.robot, found.model, parameters, found.sensors, *numbers)
-        slopes = winch_slopes(machine, lengths)
+        machine = MachineTerms.of(found.robot, found.model, parameters, found.sensors, *numbers)
+        slopes = machine.winch_slopes(lengths)
         rows, noise, misfit = whitened_errors(machine, slopes, pose_rows(found.poses)[used], found.residuals[used])
         return rows * scale, noise, misfit + rows * scale @ step, root
     residuals = found.residuals[used]
     modes = count_of_frequencies(found.sensors, m, residuals.shape[1])
-    machine = machine_of(found.robot, found.model, parameters, found.sensors)
+    machine = MachineTerms.of(found.robot, found.model, parameters, found.sensors)
     frequencies = residuals[:, residuals.shape[1] - modes :] if modes else None
     by_values, by_length = unwhitened_slopes(machine, pose_rows(found.poses)[used], lengths, frequencies)
     read = ~np.isnan(residuals[:, m:])
@@ -296,10 +296,10 @@ def variance_factors(
     rows: Array, noise: Array, misfit: Array, root: Array, groups: Sequence[Indices]
 ) -> tuple[Array, Array, Array]:
     """Estimated variances divided by stated variances, for groups of errors, by restricted maximum likelihood."""
-    # The ratios (G,) are at least `FLOOR`. The method is Fisher scoring (Förstner 1979). Relative standard errors of the
-    # deviations (G,) and redundancy numbers (G,) follow. rows: derivatives of the whitened readings, (N, R, P); noise:
-    # effects (N, R, E) of E errors with the stated variance 1 on these readings; misfit: readings minus predictions at
-    # the priors, (N, R); root: root of the prior information, (P, P).
+    # The ratios (G,) are at least `FLOOR`; relative standard errors of the deviations (G,) and redundancy numbers (G,)
+    # follow. The method is Fisher scoring (Förstner 1979). rows: derivatives of the whitened readings, (N, R, P);
+    # noise: effects (N, R, E) of E errors with the stated variance 1 on these readings; misfit: readings minus
+    # predictions at the priors, (N, R); root: root of the prior information, (P, P).
     factors = np.ones(len(groups))
     parts, missing = [noise[:, :, group] for group in groups], _units(np.asarray(~noise.any(axis=2)))
     for _ in range(ITERATIONS):

@@ -106,7 +106,7 @@ _CABLE_COLUMNS: Final = (  # first row of `kinds`, column of the cable_table, nu
 _BODY_COLUMNS: Final = ((kinds.MASS, tables.MASS, 1), (kinds.CENTER, tables.CENTER_X, 3))
 
 
-class PlatformArrays(NamedTuple):
+class _PlatformArrays(NamedTuple):
     """Robots and states of B samples, for the computation of natural frequencies."""
 
     cables: Array  # cable_table, (B, m, CABLE_COLUMNS)
@@ -116,7 +116,7 @@ class PlatformArrays(NamedTuple):
     lengths: Array  # true lengths [m], (B, m)
 
 
-def natural_frequencies(terms: ForwardTerms, freedom: Array, at: PlatformArrays) -> Array:
+def _natural_frequencies(terms: ForwardTerms, freedom: Array, at: _PlatformArrays) -> Array:
     """Natural frequencies (B, n) [Hz] of platforms on massless cables, ascending; NaN for an unstable motion."""
     (count, m), size = at.lengths.shape, tables.RESULT_ROWS if terms[-1] else tables.BARE_ROWS
     robots, memory = (freedom, locked(at.bodies), locked(at.cables)), memory_for(m)
@@ -163,7 +163,7 @@ def frequency_rows(
     longer = np.concatenate((paid, np.broadcast_to(np.eye(m), (count, m, m))), axis=2)[rows] * sizes
     samples = len(rows) * (1 + 2 * len(sizes))
     longer = np.concatenate((np.zeros((len(rows), m, 1)), longer, -longer), axis=2).transpose(2, 0, 1).reshape(-1, m)
-    at = PlatformArrays(
+    at = _PlatformArrays(
         np.tile(cable_table(robot), (samples, 1, 1)),
         np.tile(body_table(robot), (samples, 1)),
         np.tile(robot.inertia, (samples, 1, 1)),
@@ -171,7 +171,7 @@ def frequency_rows(
         np.tile(lengths[rows], (1 + 2 * len(sizes), 1)) + longer,
     )
     _change_data(robot, at, where, scale, steps, len(rows), len(sizes))
-    values = natural_frequencies(terms, robot.freedom, at)[:, :modes].reshape(1 + 2 * len(sizes), len(rows), modes)
+    values = _natural_frequencies(terms, robot.freedom, at)[:, :modes].reshape(1 + 2 * len(sizes), len(rows), modes)
     slopes = (values[1 : 1 + len(sizes)] - values[1 + len(sizes) :]) / (2.0 * sizes[:, None, None])
     found.residual[rows] = readings[rows] - values[0]
     found.slopes[rows] = slopes[:width].transpose(1, 2, 0)
@@ -179,7 +179,7 @@ def frequency_rows(
     return found
 
 
-def second_moments(inertia: Array) -> Array:
+def _second_moments(inertia: Array) -> Array:
     """Second moments of the mass (3, 3) [kg m^2] from the inertia (3, 3), both about the center of mass."""
     return np.asarray(0.5 * np.trace(inertia) * np.eye(3) - inertia)
 
@@ -187,12 +187,12 @@ def second_moments(inertia: Array) -> Array:
 def with_inertia(robot: Robot, change: Array) -> Robot:
     """Robot with changed inertia. change: logarithms of factors of the second moments of the mass, (3,)."""
     factors = np.exp(0.5 * change)
-    second = factors[:, None] * second_moments(robot.inertia) * factors
+    second = factors[:, None] * _second_moments(robot.inertia) * factors
     return robot.replace(inertia=np.trace(second) * np.eye(3) - second)
 
 
 def _change_data(
-    robot: Robot, at: PlatformArrays, where: Indices, scale: Array, steps: Array, rows: int, count: int
+    robot: Robot, at: _PlatformArrays, where: Indices, scale: Array, steps: Array, rows: int, count: int
 ) -> None:
     """Change the data of the samples, which are `rows` without a change, then with positive and negative steps."""
     for table, columns in ((at.cables, _CABLE_COLUMNS), (at.bodies[:, None], _BODY_COLUMNS)):
@@ -203,7 +203,7 @@ def _change_data(
                     for sign, begin in ((1.0, 1), (-1.0, 1 + count)) if q >= 0 else ():
                         part = slice((begin + q) * rows, (begin + q + 1) * rows)
                         table[part, i, column + axis] += sign * steps[q] * scale[first + axis, i]
-    moments = second_moments(robot.inertia)
+    moments = _second_moments(robot.inertia)
     for axis in range(3):
         q = int(where[kinds.INERTIA + axis, 0])
         half = np.zeros((3, 3))

@@ -13,7 +13,7 @@ from sagline.cables.model import CableModel
 from sagline.calibration.least_squares import best_step, evaluate_step, solve
 from sagline.calibration.log import WinchLog
 from sagline.calibration.parameters import Unknown, parameters_of
-from sagline.calibration.problem import Evaluated, FitProblem, SearchState, readings_table, start_of
+from sagline.calibration.problem import Evaluated, FitProblem, ReadingsTable, SearchState, start_of
 from sagline.core.arrays import Array, Indices
 from sagline.core.indices import evenly_spaced
 from sagline.robot.drum import drums_of
@@ -143,7 +143,7 @@ class Trial:
         read_at = self.rows + late + change.behind  # either `late` or `behind` is zero
         rows = self.rows[(read_at >= 0) & (read_at < len(log))]
         rows = rows[evenly_spaced(len(rows), most)]
-        given = readings_table(log.rows(rows))._replace(swivels=None, frequencies=None)
+        given = ReadingsTable.of(log.rows(rows))._replace(swivels=None, frequencies=None)
         read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows + change.behind], change.lengths)
         if log.load_cells is not None:
             cells = CELL_UNITS[change.cell_unit] * log.load_cells[rows + late]

@@ -15,7 +15,7 @@ from sagline.calibration.findings import Direction
 from sagline.calibration.further import swivel_senses
 from sagline.calibration.least_squares import left_jacobian
 from sagline.calibration.log import Sensors
-from sagline.calibration.parameters import Parameters, PriorUnits, prior_units
+from sagline.calibration.parameters import Parameters, PriorUnits
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds
@@ -68,7 +68,7 @@ def gauge_of(
     triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
 ) -> tuple[Direction, ...]:
     """Unobservable directions of the unknowns, with names; only the priors determine values along these directions."""
-    frame = prior_units(parameters)
+    frame = PriorUnits.of(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
     unit = np.eye(len(size))
@@ -77,7 +77,7 @@ def gauge_of(
     left = _open_directions(triangle, frame)
     where = parameters.where[_TURN, 0]
     turn = np.where(where >= 0, values[where], 0.0)  # rotation vector of the measuring system [rad]; zero if known
-    each, table, lengths, matters = symmetries(robot, sensors, turn, counted=parameters.counted)
+    each, table, lengths, matters = _symmetries(robot, sensors, turn, counted=parameters.counted)
     matters &= ~np.isin(parameters.where, alone)
     admissible = _admissible_symmetries(frame, parameters.where, table, lengths, matters)
     vectors, named = _symmetric_part(left, *admissible, each)
@@ -97,7 +97,7 @@ def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direct
 
 
 def _symmetric_part(
-    left: Array, vectors: Array, shares: Array, each: Sequence[Generator]
+    left: Array, vectors: Array, shares: Array, each: Sequence[_Generator]
 ) -> tuple[Array, list[tuple[str, str]]]:
     """Admissible symmetries in the span of the unobservable directions `left` (P, d), with names and measurements."""
     shares = shares[: len(each)]
@@ -158,7 +158,7 @@ def _echelon(rows: Array) -> Array:
     return rows
 
 
-def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
+def _named(shares: Array, known: Sequence[_Generator]) -> tuple[str, str]:
     """Name of a combination of symmetries, and the measurement that fixes the first of the symmetries."""
     size = np.abs(shares)
     taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
@@ -225,7 +225,7 @@ _SCALE: Final = "weigh some meters of the cable, measure a distance between anch
 _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
-class Generator(NamedTuple):
+class _Generator(NamedTuple):
     """Symmetry: a change of all parameters together that changes no reading."""
 
     name: str  # name of the quantity
@@ -235,15 +235,15 @@ class Generator(NamedTuple):
     lengths: float = 0.0  # relative change of the lengths off the drums
 
 
-def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generator]:
+def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[_Generator]:
     """Symmetries that have a name; turn: rotation vector (3,) of the measuring system [rad]."""
     m, winches, center, place = robot.cable_count, robot.winches, robot.center_of_mass, sensors.frame.position
 
-    def generator(name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0) -> Generator:
+    def generator(name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0) -> _Generator:
         change = np.zeros((kinds.KIND_ROWS, m))
         for rows, values in changes:
             change[rows] = values
-        return Generator(name, step, change, lengths)
+        return _Generator(name, step, change, lengths)
 
     # the linear density decreases, so that forces do not change
     scaled: list[tuple[Any, Array | float]] = [(_FRAME, robot.frame_anchors.T), (_PLATFORM, robot.platform_anchors.T)]
@@ -277,9 +277,9 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
         yield generator(f"the world shifted along {axis}", _WORLD, ([kinds.FRAME + k, kinds.SHIFT + k], 1.0))
 
 
-def symmetries(
+def _symmetries(
     robot: Robot, sensors: Sensors, turn: Array, *, counted: bool
-) -> tuple[tuple[Generator, ...], Array, Array, Flags]:
+) -> tuple[tuple[_Generator, ...], Array, Array, Flags]:
     """Symmetries of a robot and its sensors, including changes of length zeros, drum radii and length scales."""
     # The argument `turn` is the rotation vector (3,) of the measuring system [rad]. Returns the symmetries with a name,
     # and three arrays. Array 1, (KIND_ROWS, m, g), is the change of each row of `kinds` by each of g symmetries. Array

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.calibration.candidates import CandidatePoses
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import MachineTerms, predicted_rows, with_sensors
+from sagline.calibration.observations import MachineTerms, predicted_rows
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import n
 
@@ -161,7 +161,7 @@ class Situation(NamedTuple):
     def rows_by(self, sensors: Sensors) -> Array:
         """Whitened slopes (N, m + 6, P) that the sensors `sensors` would have at the poses, in units of `scale`."""
         poses, lengths = self.standing.poses, self.standing.lengths
-        return np.asarray(predicted_rows(with_sensors(self.machine, sensors), poses, lengths).matrix * self.scale)
+        return np.asarray(predicted_rows(self.machine.with_sensors(sensors), poses, lengths).matrix * self.scale)
 
 
 def most_helpful(situation: Situation) -> str:

@@ -120,88 +120,87 @@ class MachineTerms(NamedTuple):
     sensing: SensingArrays  # sensors in the form of the kernel
     slopes: Array  # derivatives of the values by the internal parameters, (P,)
 
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        model: CableModel,
+        parameters: Parameters,
+        sensors: Sensors,
+        offset: Array | float = 0.0,
+        scale: Array | float = 1.0,
+        late: Array | float = 0.0,
+        swivel_zero: Array | float = 0.0,
+    ) -> MachineTerms:
+        """Arrays of a robot and its sensors; raises an error if counts need drum data that are missing."""
+        machine = cls(
+            model,
+            parameters,
+            robot,
+            sensors,
+            np.broadcast_to(offset, robot.cable_count),
+            np.broadcast_to(scale, robot.cable_count),
+            np.broadcast_to(late, robot.cable_count),
+            np.broadcast_to(swivel_zero, robot.cable_count),
+            drums_of(robot) if parameters.counted else None,
+            (model.code, *model.parameters, has_routing(robot) or None),
+            body_table(robot),
+            cable_table(robot),
+            _sensor_arrays(robot, sensors),
+            np.zeros(0),
+        )
+        return machine.with_parameters(parameters)
 
-def machine_of(
-    robot: Robot,
-    model: CableModel,
-    parameters: Parameters,
-    sensors: Sensors,
-    offset: Array | float = 0.0,
-    scale: Array | float = 1.0,
-    late: Array | float = 0.0,
-    swivel_zero: Array | float = 0.0,
-) -> MachineTerms:
-    """A robot and its sensors as arrays for the kernel; raises an error if counts need drum data that are missing."""
-    machine = MachineTerms(
-        model,
-        parameters,
-        robot,
-        sensors,
-        np.broadcast_to(offset, robot.cable_count),
-        np.broadcast_to(scale, robot.cable_count),
-        np.broadcast_to(late, robot.cable_count),
-        np.broadcast_to(swivel_zero, robot.cable_count),
-        drums_of(robot) if parameters.counted else None,
-        (model.code, *model.parameters, has_routing(robot) or None),
-        body_table(robot),
-        cable_table(robot),
-        _sensor_arrays(robot, sensors),
-        np.zeros(0),
-    )
-    return with_parameters(machine, parameters)
+    def with_parameters(self, parameters: Parameters) -> MachineTerms:
+        """The machine with other unknowns. Unknown pulley radii and dead lengths need routing, even if zero."""
+        routed = self.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
+        terms = (*self.terms[:-1], routed or None)
+        return self._replace(parameters=parameters, terms=terms, slopes=slopes_of_values(self.robot, parameters))
 
+    def with_sensors(self, sensors: Sensors) -> MachineTerms:
+        """The machine with other sensors."""
+        return self._replace(sensors=sensors, sensing=_sensor_arrays(self.robot, sensors))
 
-def with_parameters(machine: MachineTerms, parameters: Parameters) -> MachineTerms:
-    """The machine with other unknowns. Unknown pulley radii and dead lengths need routing, even if they are zero."""
-    routed = machine.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
-    terms = (*machine.terms[:-1], routed or None)
-    return machine._replace(parameters=parameters, terms=terms, slopes=slopes_of_values(machine.robot, parameters))
+    def with_unit_sensors(self) -> MachineTerms:
+        """The machine with exact lengths; its other sensors have standard deviations of 1 in SI units."""
+        sensors = self.sensors
+        rotation = [1.0, 1.0, 1.0 if sensors.rotation_deviation is None or measures_yaw(sensors) else np.inf]
+        names = ("swivel_deviation", "frequency_deviation")
+        further = {name: None if getattr(sensors, name) is None else 1.0 for name in names}
+        exact = Sensors(EXACT, 1.0, 1.0, rotation, **further, frame=sensors.frame, target=sensors.target)
+        return self.with_sensors(exact)
 
-
-def with_sensors(machine: MachineTerms, sensors: Sensors) -> MachineTerms:
-    """The machine with other sensors."""
-    return machine._replace(sensors=sensors, sensing=_sensor_arrays(machine.robot, sensors))
-
-
-def with_unit_sensors(machine: MachineTerms) -> MachineTerms:
-    """The machine with exact lengths, and other sensors of the same kinds with standard deviations of 1 in SI units."""
-    sensors = machine.sensors
-    rotation = [1.0, 1.0, 1.0 if sensors.rotation_deviation is None or measures_yaw(sensors) else np.inf]
-    more = [None if deviation is None else 1.0 for deviation in (sensors.swivel_deviation, sensors.frequency_deviation)]
-    further = {"swivel_deviation": more[0], "frequency_deviation": more[1]}
-    exact = Sensors(EXACT, 1.0, 1.0, rotation, **further, frame=sensors.frame, target=sensors.target)
-    return with_sensors(machine, exact)
-
-
-def winch_slopes(machine: MachineTerms, lengths: Array, counts: Array | None = None) -> Array:
-    """Derivatives of reported lengths (N, m) [m] by the unknowns of `SLOPES`, (5, N, m); zero for clock_offset."""
-    # counts: read counts (N, m); None to compute the counts from the lengths.
-    slopes = np.zeros((SLOPES, *lengths.shape))
-    if machine.drums is None:
-        slopes[0], slopes[3] = 1.0, (lengths - machine.offset) / machine.scale
+    def winch_slopes(self, lengths: Array, counts: Array | None = None) -> Array:
+        """Derivatives of reported lengths (N, m) [m] by the unknowns of `SLOPES`, (5, N, m); zero for clock_offset."""
+        # counts: read counts (N, m); None to compute the counts from the lengths.
+        slopes = np.zeros((SLOPES, *lengths.shape))
+        if self.drums is None:
+            slopes[0], slopes[3] = 1.0, (lengths - self.offset) / self.scale
+            return slopes
+        counts = counts_at(self.drums, lengths) if counts is None else counts
+        with_radius = bool((self.parameters.where[kinds.DRUM] >= 0).any())
+        robot, winches = self.robot, self.drums.winches
+        stiffness = robot.cables.axial_stiffness
+        strain = winches.winding_tension / stiffness
+        slopes[2] = lengths * strain / (stiffness * (1.0 + strain))
+        if (
+            winches.drum_distance is None and (winches.layers == 1.0).all()
+        ):  # all turns on the drum have the same length
+            slopes[0] = 1.0 / (1.0 + strain)
+            if with_radius:
+                radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
+                circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
+                turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # derivative of one turn by the radius
+                turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
+                slopes[1] = turns * turn_slope / (1.0 + strain)
+            return slopes
+        for row, name in ((0, "length_zero"), (1, "drum_radius"))[: 1 + with_radius]:
+            value = _known_field(winches, name)
+            step = STEP * value
+            ends = (robot.replace(winches=winches.replace(**{name: value + sign * step})) for sign in (-1.0, 1.0))
+            low, high = (lengths_at_counts(drums_of(end), counts) for end in ends)
+            slopes[row] = (high - low) / (2.0 * step)
         return slopes
-    counts = counts_at(machine.drums, lengths) if counts is None else counts
-    with_radius = bool((machine.parameters.where[kinds.DRUM] >= 0).any())
-    robot, winches = machine.robot, machine.drums.winches
-    stiffness = robot.cables.axial_stiffness
-    strain = winches.winding_tension / stiffness
-    slopes[2] = lengths * strain / (stiffness * (1.0 + strain))
-    if winches.drum_distance is None and (winches.layers == 1.0).all():  # all turns on the drum have the same length
-        slopes[0] = 1.0 / (1.0 + strain)
-        if with_radius:
-            radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
-            circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
-            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # derivative of one turn by the radius
-            turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
-            slopes[1] = turns * turn_slope / (1.0 + strain)
-        return slopes
-    for row, name in ((0, "length_zero"), (1, "drum_radius"))[: 1 + with_radius]:
-        value = _known_field(winches, name)
-        step = STEP * value
-        ends = (robot.replace(winches=winches.replace(**{name: value + sign * step})) for sign in (-1.0, 1.0))
-        low, high = (lengths_at_counts(drums_of(end), counts) for end in ends)
-        slopes[row] = (high - low) / (2.0 * step)
-    return slopes
 
 
 def whitened_rows(
@@ -236,7 +235,7 @@ def _with_further(
     m, sensors, where = lengths.shape[1], machine.sensors, machine.parameters.where.copy()
     where[kinds.SHIFT : kinds.SCALE] = -1  # the measuring system does not move the platform
     parameters = replace(machine.parameters, where=locked(where))
-    plain = with_sensors(machine, POSE_SENSORS)._replace(parameters=parameters)
+    plain = machine.with_sensors(POSE_SENSORS)._replace(parameters=parameters)
     moves = _observed(plain, _no_readings(lengths), slopes, poses, lengths, direction)
     motion = moves.matrix[:, m:], np.swapaxes(moves.back, 1, 2)[:, m:] / EXACT**2
     factor = machine.slopes if direction is None else machine.slopes * direction
@@ -321,7 +320,7 @@ def predicted_rows(
     # frequencies: (N, K), NaN where no slopes are wanted, or None.
     more = machine.sensors.swivel_deviation is not None or frequencies is not None
     further = FurtherReadings(None, frequencies) if more else None
-    slopes, readings = winch_slopes(machine, lengths), _no_readings(lengths)
+    slopes, readings = machine.winch_slopes(lengths), _no_readings(lengths)
     rows = whitened_rows(machine, readings, slopes, poses, lengths, further=further)
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
@@ -331,7 +330,7 @@ def unwhitened_slopes(
 ) -> tuple[Array, Array]:
     """Derivatives of load cells, position and rotation [SI]: (N, m + 6, P) by values, (N, m + 6, m) by lengths."""
     # The derivatives of swivel angles follow in m more rows, then those of frequencies (N, K), if given.
-    (count, m), machine = lengths.shape, with_unit_sensors(machine)
+    (count, m), machine = lengths.shape, machine.with_unit_sensors()
     width = len(reading_deviations(machine.sensors, m, 0 if frequencies is None else frequencies.shape[1])) - m
     by_values, by_length = np.empty((count, width, len(machine.slopes))), np.empty((count, width, m))
     for part in blocks(count, BLOCK):

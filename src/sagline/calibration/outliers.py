@@ -187,7 +187,7 @@ def outliers_in(
     more = [read for read in (log.swivels, log.frequencies) if read is not None]
     read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3], *more))) & np.isfinite(deviation[m:])
     parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), machine.sensors, counted=False)
-    exactly = observations.with_unit_sensors(observations.with_parameters(machine, parameters))  # no slopes are used
+    exactly = machine.with_parameters(parameters).with_unit_sensors()  # no slopes are used
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)

@@ -379,15 +379,15 @@ class PriorUnits(NamedTuple):
     units: Array  # one standard deviation in the units of the parameters, (P,)
     free: Indices  # indices of the parameters that do not count as known
 
-
-def prior_units(parameters: Parameters) -> PriorUnits:
-    """Unit of each parameter: its prior deviation or, without a prior, the usual deviation of an unknown value."""
-    # A unit is at most `_WIDE` usual deviations, because rounding would otherwise hide the other parameters.
-    size = np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
-    usual = parameters.usual_deviation * size
-    units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
-    units = np.minimum(units, _WIDE * usual)
-    scale = units / size
-    common = np.array([KINDS[name].deviation for name in parameters.names])
-    fixed = parameters.stated & (scale < _FIXED * common)
-    return PriorUnits(scale, units, np.flatnonzero(~fixed).astype(np.int64))
+    @classmethod
+    def of(cls, parameters: Parameters) -> PriorUnits:
+        """Unit of each parameter: its prior deviation or, without a prior, the usual deviation of an unknown value."""
+        # A unit is at most `_WIDE` usual deviations, because rounding would otherwise hide the other parameters.
+        size = np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
+        usual = parameters.usual_deviation * size
+        units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
+        units = np.minimum(units, _WIDE * usual)
+        scale = units / size
+        common = np.array([KINDS[name].deviation for name in parameters.names])
+        fixed = parameters.stated & (scale < _FIXED * common)
+        return cls(scale, units, np.flatnonzero(~fixed).astype(np.int64))

@@ -14,7 +14,7 @@ from sagline.calibration import information
 from sagline.calibration.candidates import CandidatePoses, candidates_of, shortest_tour, tour_length
 from sagline.calibration.findings import UNITS
 from sagline.calibration.log import READINGS, Sensors
-from sagline.calibration.observations import has_drum_data, machine_of, predicted_rows
+from sagline.calibration.observations import MachineTerms, has_drum_data, predicted_rows
 from sagline.calibration.parameters import (
     DEFAULT,
     Parameters,
@@ -242,7 +242,7 @@ def calibration_poses(
         8.0 * 3.0 * tried * (robot.cable_count + 6) * len(parameters.names),
         "Ask for fewer candidates.",
     )
-    machine = machine_of(robot, _CATENARY, parameters, read)
+    machine = MachineTerms.of(robot, _CATENARY, parameters, read)
     scale, held = _scale(parameters, machine.slopes)
     rows = predicted_rows(machine, standing.poses, standing.lengths).matrix * scale
     stable = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))

@@ -16,8 +16,6 @@ from sagline.calibration.observations import (
     MachineTerms,
     WhitenedRows,
     lengths_at_counts,
-    machine_of,
-    winch_slopes,
 )
 from sagline.calibration.parameters import Parameters, sensors_with, with_values
 from sagline.calibration.straight import lines_at
@@ -50,15 +48,15 @@ class ReadingsTable(NamedTuple):
     swivels: Array | None = None  # swivel angles [rad], (N, m), or None
     frequencies: Array | None = None  # natural frequencies [Hz], (N, K), or None
 
-
-def readings_table(log: WinchLog) -> ReadingsTable:
-    """Readings of a log as a table; columns that the log does not have are NaN."""
-    count, m = log.readings.shape
-    columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
-    tables = (np.broadcast_to(np.nan, (count, width)) if read is None else read for read, width in columns)
-    further = {"swivels": log.swivel, "frequencies": log.frequency}
-    cells, positions, rotations = tables
-    return ReadingsTable(log.counts, log.unstrained_length, cells, positions, rotations, **further)
+    @classmethod
+    def of(cls, log: WinchLog) -> ReadingsTable:
+        """Readings of a log as a table; columns that the log does not have are NaN."""
+        count, m = log.readings.shape
+        columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
+        tables = (np.broadcast_to(np.nan, (count, width)) if read is None else read for read, width in columns)
+        further = {"swivels": log.swivel, "frequencies": log.frequency}
+        cells, positions, rotations = tables
+        return cls(log.counts, log.unstrained_length, cells, positions, rotations, **further)
 
 
 class FitProblem(NamedTuple):
@@ -122,7 +120,7 @@ class FitProblem(NamedTuple):
         robot, sensors = with_values(self.robot, parameters, values), sensors_with(self.sensors, parameters, values)
         offset, scale = parameters.length_offset(values), parameters.of_cables(values, kinds.SCALE, 1.0)
         late, turned = (parameters.of_cables(values, row, 0.0) for row in (kinds.CLOCK, kinds.SWIVEL))
-        return machine_of(robot, self.model, parameters, sensors, offset, scale, late, turned)
+        return MachineTerms.of(robot, self.model, parameters, sensors, offset, scale, late, turned)
 
     def reported_lengths(self, machine: MachineTerms, part: slice = slice(None)) -> Array:
         """Lengths (n, m) [m] that the winches report at the poses `part`."""
@@ -138,7 +136,7 @@ class FitProblem(NamedTuple):
     def winch_slopes(self, machine: MachineTerms, lengths: Array, part: slice, *, counted: bool = True) -> Array:
         """Derivatives (5, n, m) of the reported lengths (n, m) [m] at the poses `part`; counted: at the read counts."""
         counts = self.log.counts[part] if counted and self.log.counts is not None else None
-        slopes = winch_slopes(machine, lengths, counts)
+        slopes = machine.winch_slopes(lengths, counts)
         if self.log.motion is not None:
             speed, acceleration = self.log.motion[:, part]
             slopes[4] = machine.scale * (speed + machine.late * acceleration)
@@ -184,7 +182,7 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     # tensions, because an anchor error of one millimeter changes the tension of a steel cable by about 90 N.
     numbers = problem.prior
     offset = problem.parameters.length_offset(problem.parameters.prior)
-    machine = machine_of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
+    machine = MachineTerms.of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
     reported = problem.reported_lengths(machine)
     poses = _poses(problem, machine, reported, commanded)
     if problem.straight:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from sagline.calibration import findings, summary
 from sagline.calibration.findings import Findings, SensorDeviation
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import MachineTerms, machine_of, unwhitened_slopes, winch_slopes
+from sagline.calibration.observations import MachineTerms, unwhitened_slopes
 from sagline.calibration.straight import slopes_of_poses
 from sagline.core.arguments import choice, flag
 from sagline.core.arrays import Array, locked, numbers
@@ -87,7 +87,7 @@ _WITHOUT_MOTION = (
 def motion_slopes(machine: MachineTerms, poses: Array, lengths: Array) -> tuple[Array, Array]:
     """Derivatives of the pose (origin, rotation vector) [m, rad]: (N, 6, P) by values and (N, 6, m) by lengths."""
     if machine.model.code == codes.STRAIGHT:
-        by_values, by_length = slopes_of_poses(machine, winch_slopes(machine, lengths), poses)
+        by_values, by_length = slopes_of_poses(machine, machine.winch_slopes(lengths), poses)
         by_values = by_values / machine.slopes
     else:
         by_values, by_length = (slopes[:, lengths.shape[1] :] for slopes in unwhitened_slopes(machine, poses, lengths))
@@ -235,7 +235,7 @@ class Calibration(Findings, Saved):
 
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
         reported = self.length_offset, self.length_scale
-        machine = machine_of(self.robot, self.model, self.parameters, Sensors(), *reported)
+        machine = MachineTerms.of(self.robot, self.model, self.parameters, Sensors(), *reported)
         return motion_slopes(machine, poses, lengths)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import has_drum_data, machine_of, unwhitened_slopes
+from sagline.calibration.observations import MachineTerms, has_drum_data, unwhitened_slopes
 from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, parameters_of
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
@@ -37,7 +37,7 @@ def uncertainty_of(plan: Plan) -> Uncertainty:
     errors = _known_errors(robot)
     robot = robot.replace(tolerances=errors, winches=(robot.winches or Winch()).replace(load_cell_gain=1.0))
     parameters = _parameters(robot, errors)
-    machine = machine_of(robot, state.cables.model, parameters, Sensors())
+    machine = MachineTerms.of(robot, state.cables.model, parameters, Sensors())
     names = np.array(parameters.names)
     part_of = np.stack([names == name for name in errors], axis=-1).astype(np.float64)  # (P, K)
     solved, shape = np.atleast_1d(plan.solved), plan.status.shape

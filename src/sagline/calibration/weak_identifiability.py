@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.calibration.findings import Direction
 from sagline.calibration.identifiability import easiest_measurement, measurement_rank
-from sagline.calibration.parameters import Parameters, PriorUnits, prior_units
+from sagline.calibration.parameters import Parameters, PriorUnits
 from sagline.core.arrays import Array, Flags, Indices, locked
 
 LITTLE: Final = 0.5  # a direction is weakly identifiable if a larger share of its prior deviation remains
@@ -29,7 +29,7 @@ def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direct
     # The result begins with directions that keep more than the share `LITTLE` of the prior deviation, the largest share
     # first. Next are pairs of parameters with a correlation above `ALIKE`. The last are single parameters that change
     # the readings as a combination of parameters of all cables does.
-    frame = prior_units(parameters)
+    frame = PriorUnits.of(parameters)
     complement = _complement(frame, gauge)
     if not complement.shape[1]:
         return ()
