@@ -10,7 +10,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.control.null_space import Gains, gains_along
 from sagline.control.states import RefusedError
-from sagline.core.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, locked
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
@@ -120,12 +120,8 @@ def _at_ticks(path: Path, period: float) -> Path:
         chosen, ticks = np.append(chosen, len(time) - 1), np.append(ticks, [period * count])
     if len(ticks) < 2:
         raise RefusedError("the path", f"it takes {time[-1]:g} s, less than a cycle", "Give a longer path.")
-    return _path_at(path, chosen, ticks)
-
-
-def _path_at(path: Path, chosen: Indices, time: Array) -> Path:
     jerk = None if path.jerk is None else path.jerk[chosen]
-    return Path(time, path.pose[chosen], path.twist[chosen], path.twist_rate[chosen], jerk)
+    return Path(ticks, path.pose[chosen], path.twist[chosen], path.twist_rate[chosen], jerk)
 
 
 def _check_rest(path: Path) -> None:
@@ -165,13 +161,11 @@ def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: A
 
 
 def _check_steps(time: Array, length: Array, rate: Array) -> None:
-    """Reject a path whose twists contradict its poses, because then the rates do not agree with the lengths.
-
-    Within a step h, the rate is assumed to be between the rates at both ends. The change of length then differs from h
-    times the mean rate by at most h/2 times the difference of the rates. The largest difference of the rates in this
-    step and its two neighbors is used. A deviation above the allowed jump of an encoder is never accepted. The steps
-    are between the samples of the path. Ticks are not used, because the path may end before a tick.
-    """
+    """Reject a path whose twists contradict its poses, because then the rates do not agree with the lengths."""
+    # Within a step h, the rate is assumed to be between the rates at both ends. The change of length then differs from
+    # h times the mean rate by at most h/2 times the difference of the rates. The largest difference of the rates in
+    # this step and its two neighbors is used. A deviation above the allowed jump of an encoder is never accepted. The
+    # steps are between the samples of the path. Ticks are not used, because the path may end before a tick.
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))
     change = np.abs(np.diff(rate, axis=0))

@@ -67,11 +67,9 @@ _AGAIN: Final = "Try again; if this continues, check the program of the PLC."
 def disagreement(
     sample: link.Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = link.PERIOD
 ) -> tuple[link.Refusal | None, bool]:
-    """First reason why a group does not agree, and True if the operator must act. (None, False) if all groups agree.
-
-    A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not locked,
-    and it has accepted one of the last commands. Reasons that concern the whole group are checked first.
-    """
+    """First reason why a group does not agree, and True if the operator must act. (None, False) if all groups agree."""
+    # A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not
+    # locked, and it has accepted one of the last commands. Reasons that concern the whole group are checked first.
     status, other = sample.status, sample.owner
     faulty = (sample.winch_fault != 0) | (sample.state == int(link.WinchState.FAULT))
     tripped = np.array([bool(faulty[list(winches)].any()) for winches in groups])

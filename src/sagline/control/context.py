@@ -40,13 +40,7 @@ MARGIN: Final = 500  # number of cycles in the table in addition to the plan, fo
 
 
 class _Estimator:
-    """Forward kinematics of each sample. Each search starts at the previous pose.
-
-    Attributes:
-        position: Position of the platform's origin [m], shape (3,); NaN if it was never known.
-        quaternion: Rotation platform -> world, scalar last, shape (4,).
-        status: Code of the `ForwardStatus`; -1 without an estimate.
-    """
+    """Forward kinematics of each sample. Each search starts at the previous pose."""
 
     def __init__(self, robot: Robot, model: CableModel) -> None:
         """Begin without a pose."""
@@ -60,6 +54,9 @@ class _Estimator:
 
     def forget(self) -> None:
         """Forget the pose."""
+        # position: position of the platform's origin [m], shape (3,); NaN if it was never known
+        # quaternion: rotation platform -> world, scalar last, shape (4,)
+        # status: code of the `ForwardStatus`; -1 without an estimate
         self.position, self.quaternion, self.status = np.full(3, np.nan), np.full(4, np.nan), -1
 
     def begin_at(self, pose: Pose) -> None:
@@ -114,11 +111,7 @@ class _Run:
 
 
 class Context:
-    """Data and services that the states of a controller share.
-
-    Attributes:
-        correction: Lengths that the tension loop adds to the lengths of the plan [m], shape (m,).
-    """
+    """Data and services that the states of a controller share."""
 
     def __init__(
         self,
@@ -240,7 +233,7 @@ class Context:
         """Create a tension loop with zero correction; None for a robot without redundancy."""
         m, n = self.robot.cable_count, self.robot.degrees_of_freedom
         self.tension_loop = TensionLoop(m, self.settings, self.period) if m > n else None
-        self.correction = np.zeros(m)
+        self.correction = np.zeros(m)  # lengths that the tension loop adds to the lengths of the plan [m]
 
     def find_equilibrium(self, length: Array) -> Standing | ForwardStatus:
         """Equilibrium at `length` [m], (m,). The search takes 1 ms, or up to 10 ms if the pose is unknown."""

@@ -36,26 +36,9 @@ class ExecutionStatus(Status):
 class Samples(Result):
     """N samples of a machine. The fields have the meanings and units of the fields of `Sample`.
 
-    In cycles without a sample, floats are NaN, and integers are 0.
-
-    Attributes:
-        time: Shape (N,).
-        age: Shape (N, G).
-        counter: Shape (N, G).
-        plc_time: Shape (N, G).
-        owner: Shape (N, G).
-        echo: Shape (N, G).
-        status: Shape (N, G).
-        fault: Shape (N, G).
-        length: Measured length, without the offset from homing, shape (N, m).
-        rate: Shape (N, m).
-        torque: Shape (N, m).
-        tension: Shape (N, m).
-        filtered: Shape (N, m).
-        counts: Shape (N, m).
-        state: Shape (N, m).
-        winch_fault: Shape (N, m).
-        discarded: Shape (N, G).
+    The shape of `time` is (N,); that of the values of winches, `length` to `winch_fault`, (N, m); that of the values of
+    groups, all others, (N, G). The lengths do not include the offset from homing. In cycles without a sample, floats
+    are NaN, and integers are 0.
     """
 
     time: Array

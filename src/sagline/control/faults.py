@@ -37,7 +37,6 @@ class _Old(Fault):
     step: str
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the group with the oldest sample."""
         worst, limit = self.seen.oldest, self.cycles * self.seen.period
         if worst < limit * (1.0 - ROUNDING):
             return None
@@ -78,14 +77,12 @@ class _BlockDiscarded(Fault):
     within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
-        """Create the rule without findings."""
         super().__init__(seen)
         self._quiet, self._line = WINDOW, ""
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first group with discarded blocks. The fault ends after one second without such blocks."""
         sample, before = cycle.sample, cycle.before
-        self._quiet += 1
+        self._quiet += 1  # the fault ends after a second without discarded blocks
         if before is not None and sample.discarded.tolist() != before.discarded.tolist():
             group = int(np.argmax(sample.discarded - before.discarded))
             count = int(sample.discarded[group])
@@ -105,7 +102,6 @@ class _OwnerLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first group that another controller or no controller owns."""
         command = cycle.command
         if command is None or command.mode == _LEAVE:
             return None
@@ -127,12 +123,10 @@ class _GroupActs(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Create the rule without findings."""
         super().__init__(seen)
         self._reported: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the groups that have stopped since the last cycle, with the reason of the first group."""
         seen, sample = self.seen, cycle.sample
         if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
             return None
@@ -169,7 +163,6 @@ class _EmergencyStop(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the groups that report an emergency stop."""
         if not (self.seen.faulted or self.seen.bits & _EMERGENCY):
             return None
         sample = cycle.sample
@@ -189,13 +182,11 @@ class _CycleLate(Fault):
     within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
-        """Create the rule without late cycles."""
         super().__init__(seen)
         self._cycle = 0
         self._late: deque[tuple[int, float]] = deque()  # times and delays of late cycles in the window
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the longest delay of the last second, or for the number of late cycles."""
         self._cycle += 1
         late = self._late
         if LATE_OFTEN < cycle.late <= LOST:
@@ -224,7 +215,6 @@ class _CycleLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message that gives the delay of the cycle."""
         if cycle.late <= LOST:
             return None
         return (
@@ -242,7 +232,6 @@ class _RecordingStopped(Fault):
     within = "1 s"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message with the reason why recording stopped."""
         if not cycle.recording:
             return None
         why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."

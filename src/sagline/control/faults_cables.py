@@ -26,13 +26,11 @@ class _OverTension(Fault):
     within = "10 to 50 ms"
 
     def __init__(self, seen: Evidence) -> None:
-        """Create the rule without findings."""
         super().__init__(seen)
         self._near = NEAR * seen.limit
         self._least = float(self._near.min())
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the cable whose tension is largest in relation to its limit."""
         seen, tension = self.seen, self.seen.tension
         if not seen.most > self._least:
             self._for.fill(0)
@@ -64,7 +62,6 @@ class _CableBroken(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first cable that has broken since the last cycle."""
         seen = self.seen
         if not (seen.any_low and seen.compared):
             return None
@@ -98,7 +95,6 @@ class _Slack(Fault):
     within = "30 ms"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first slack cable."""
         seen = self.seen
         if not seen.any_low:
             return None
@@ -128,7 +124,6 @@ class _CellLost(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first cell that has lost its reading since the motion began."""
         seen = self.seen
         command = cycle.command
         if seen.plain or command is None or command.mode != Mode.FOLLOW or not command.rate.any():
@@ -157,12 +152,10 @@ class _CellDead(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Create the rule without findings."""
         super().__init__(seen)
         self._least, self._most = -SIGMAS * seen.sigma, float(seen.full_scale.min())
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first cell with a new impossible reading."""
         seen, tension = self.seen, cycle.sample.tension
         if seen.plain and seen.least >= self._least and seen.most < self._most and not seen.any_low:
             return None
@@ -191,7 +184,6 @@ class _CellStuck(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first cell that has become stuck since the last cycle."""
         seen = self.seen
         if cycle.before is None:
             return None
@@ -222,16 +214,14 @@ class _CellOff(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Create the rule without findings."""
         super().__init__(seen)
         self._samples = round(ODD_TIME / seen.period)
         self._side = np.zeros(len(seen.group_of))  # sign of each error above the limit in the previous cycle, or 0
         self._quiet = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for a wrong cell. While one cell is wrong, the other cells cannot be compared."""
         seen = self.seen
-        error = self._error(cycle)
+        error = self._error(cycle)  # while one cell is wrong, the others cannot be compared
         limit = SIGMAS * seen.sigma
         if error is None or not largest(error) > limit:
             if not self._quiet:

@@ -39,13 +39,11 @@ class _EncoderJump(Fault):
     homing = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Create the rule without a sample."""
         super().__init__(seen)
         self._numbers = False  # False for encoders whose previous reading was not finite
         self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # cycles with a command each, per group
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the largest jump, or for a reading that is not finite."""
         sample, before = cycle.sample, cycle.before
         known, self._numbers = self._numbers, finite(sample.length) and finite(sample.rate)
         if before is not None:
@@ -97,12 +95,10 @@ class _FollowingError(Fault):
     homing = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without a command."""
         super().__init__(seen)
         self._sent: deque[Command] = deque(maxlen=REMEMBERED)
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the drum with the largest distance from its set point."""
         command, length = cycle.command, cycle.sample.length
         if command is None or command.mode != _FOLLOW:
             self._sent.clear()
@@ -121,10 +117,8 @@ class _FollowingError(Fault):
         )
 
     def _away(self, cycle: Cycle) -> Array:
-        """Distance [m], (m,), of each length from the interval between the last two set points that its PLC accepted.
-
-        Drives that are not enabled, and groups whose commands are still in transit, are excluded.
-        """
+        """Distances (m,) [m] of the lengths from the intervals between the last two set points that the PLCs accepted."""
+        # drives that are not enabled, and groups whose commands are still in transit, are excluded
         sent = {command.counter: k for k, command in enumerate(self._sent)}
         length = cycle.sample.length
         away = np.zeros(length.size)
@@ -153,13 +147,11 @@ class _NotFollowing(Fault):
     within = "40 or 100 ms"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without a command."""
         super().__init__(seen)
         self._first: int | None = None  # counter of the first command to follow
         self._idle: dict[int, int] = {}  # consecutive samples in which a group does not follow an accepted command
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the first group that does not accept or follow commands."""
         command, sample = cycle.command, cycle.sample
         if command is None or command.mode != _FOLLOW:
             self._first = None
@@ -206,7 +198,6 @@ class _ServoSaturated(Fault):
     within = "0.2 s"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the drive that has been at its limit for the longest time."""
         if _AT_LIMIT not in self.seen.states:
             self._for.fill(0)
             return None
@@ -231,7 +222,6 @@ class _CorrectionAtLimit(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the length with the largest correction."""
         if largest(cycle.correction) < self.seen.largest * (1.0 - 1e-9):
             return None
         winch = int(np.argmax(np.abs(cycle.correction)))

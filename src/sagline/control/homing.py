@@ -31,12 +31,10 @@ _READING: Final = ("length_zero", "drum_radius")  # quantities with which counts
 
 
 def _length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Array:
-    """Allowed difference between lengths of a machine and lengths from homing, 5 sigma [m], shape (m,).
-
-    A difference is due to errors of the load cells, the resolution of the encoders, and errors of the robot's data. The
-    errors of the robot's data are its tolerances, or the standard errors of its calibration if these are smaller. Each
-    error changes the computed length at the pose of `state`.
-    """
+    """Allowed difference between lengths of a machine and lengths from homing, 5 sigma [m], shape (m,)."""
+    # A difference is due to errors of the load cells, the resolution of the encoders, and errors of the robot's data.
+    # The errors of the robot's data are its tolerances, or the standard errors of its calibration if these are smaller.
+    # Each error changes the computed length at the pose of `state`.
     winches = robot.winches
     assert winches is not None  # a controller needs the data of the drums
     length, lever = state.unstrained_length, drum_lever(robot, state.unstrained_length)  # lever: [m/rad]
@@ -83,7 +81,6 @@ def _cell_sigma(robot: Robot) -> Array:
 
 
 def _zeros(winches: Winch | None) -> Array:
-    """Zeros of the lengths of the winches after homing."""
     assert winches is not None
     assert winches.length_zero is not None
     return winches.length_zero
@@ -93,18 +90,6 @@ def _varied(robot: Robot, name: str, change: Array) -> Robot:
     """Copy of the robot in which `change` is added to the quantity `name`."""
     value = value_of(robot, name)
     return robot if value is None else with_quantities(robot, {name: value + change})
-
-
-def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> str:
-    """Text that names the pose for the lengths `length` [m], (m,), and the distance of this pose from `stated`."""
-    found = forward(robot, length, start=stated, model=model)
-    if not found.stable:
-        return "at its lengths, the platform has no equilibrium near the stated pose"
-    x, y, z = np.round(found.pose.position, 3) + 0.0  # no negative zero
-    apart = 1e3 * float(np.linalg.norm(found.pose.position - stated.position))
-    turn = 2.0 * math.acos(min(abs(float(found.pose.quaternion @ stated.quaternion)), 1.0))
-    away = f"{apart:.1f} mm and {math.degrees(turn):.1f} degrees away"
-    return f"at its lengths, the platform is at ({x:.3f}, {y:.3f}, {z:.3f}) m, {away}"
 
 
 WINDOW: Final = 50  # number of samples at rest whose mean is compared with the plan
@@ -161,7 +146,6 @@ class Homing:
         self.agrees = self.confirmed = False
 
     def _rest(self) -> None:
-        """Begin a new mean of samples."""
         self._count = 0
         self._lengths[:] = self._tensions[:] = 0.0
 
@@ -209,7 +193,15 @@ class Homing:
     @property
     def _place(self) -> str:
         """Text with the pose that the platform would have if the lengths of the machine were right."""
-        return place_of(self._robot, self.state.unstrained_length + self.apart, self._pose, self._model)
+        stated, length = self._pose, self.state.unstrained_length + self.apart
+        found = forward(self._robot, length, start=stated, model=self._model)
+        if not found.stable:
+            return "at its lengths, the platform has no equilibrium near the stated pose"
+        x, y, z = np.round(found.pose.position, 3) + 0.0  # no negative zero
+        apart = 1e3 * float(np.linalg.norm(found.pose.position - stated.position))
+        turn = 2.0 * math.acos(min(abs(float(found.pose.quaternion @ stated.quaternion)), 1.0))
+        away = f"{apart:.1f} mm and {math.degrees(turn):.1f} degrees away"
+        return f"at its lengths, the platform is at ({x:.3f}, {y:.3f}, {z:.3f}) m, {away}"
 
     def _conflict(self) -> RefusedError:
         """Create the error for the length that differs most, with the pose that follows from the machine's lengths."""

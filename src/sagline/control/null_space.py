@@ -84,10 +84,7 @@ def parity(state: Equilibrium) -> Array:
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
-        >>> state = sl.inverse(robot, pose).state
-        >>> sl.control.parity(state).shape
+        >>> sl.control.parity(sl.load_robot("cogiro"), (1.0, 0.5, 2.0)).shape
         (8, 8)
 
     Source:
@@ -144,10 +141,7 @@ def null_space(state: Equilibrium) -> NullSpace:
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
-        >>> state = sl.inverse(robot, pose).state
-        >>> null = sl.control.null_space(state)
+        >>> null = sl.control.null_space(sl.load_robot("cogiro"), (1.0, 0.5, 2.0))
 
     Source:
         docs/model.md, section 12.

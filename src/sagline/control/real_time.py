@@ -161,11 +161,9 @@ def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
 
 
 def result_in_thread(work: Callable[[], T]) -> Future[T]:
-    """Run `work` in another thread of ordinary priority. Canceling the returned future does not stop the work.
-
-    Cycles continue during the work, because compiled kernels release Python's lock. A process instead of the thread
-    would make cycles late at the moment when it returns a long plan.
-    """
+    """Run `work` in another thread of ordinary priority. Canceling the returned future does not stop the work."""
+    # cycles continue during the work, because compiled kernels release Python's lock. A process instead of the thread
+    # would make cycles late at the moment when it returns a long plan.
     result: Future[T] = Future()
 
     def run() -> None:
@@ -220,7 +218,6 @@ def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> t
 
 
 def _straight_set_point(robot: Robot, pose: Pose) -> SetPoint:
-    """Set point for a robot with straight cables."""
     length = np.linalg.norm(pose.transform(robot.platform_anchors) - robot.frame_anchors, axis=1)
     none, unknown = np.zeros(len(length)), np.full(len(length), np.nan)
     return SetPoint(length, none, unknown, unknown, None, None, np.nan, True)

@@ -203,7 +203,6 @@ def smooth(share: _Real) -> _Real:
 
 
 def _smooth_slope(share: _Real) -> _Real:
-    """Derivative of `smooth`."""
     return 6.0 * share * (1.0 - share)
 
 

@@ -64,7 +64,6 @@ class _GroupThread(Thread):
         self._kick.set()
 
     def abort(self) -> None:
-        """Stop the thread immediately."""
         self._wire.abort()
 
     def silence(self, waited: float) -> link.Refusal:

@@ -68,7 +68,6 @@ class _ModbusWire:
     """Connection to one PLC. Each holding register contains two bytes of a block, the same bytes as over S7."""
 
     def __init__(self, host: str, port: int, device: int) -> None:
-        """Store the address. The method `open` connects."""
         with plc_packages():
             from pymodbus.client import ModbusTcpClient
         self._client = ModbusTcpClient(host, port=port, timeout=ANSWER, retries=0)
@@ -76,7 +75,6 @@ class _ModbusWire:
         self._device = device
 
     def open(self) -> None:
-        """Connect within the time ANSWER."""
         try:
             connected = self._client.connect()  # type: ignore[no-untyped-call]
         except Exception as error:
@@ -89,7 +87,6 @@ class _ModbusWire:
             raise WireError(Refusal("the connection was closed", "Check that no other client is connected to it"))
 
     def read(self, block: Block) -> bytes:
-        """Read the bytes of a block."""
         count = block.size // 2
         try:
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
@@ -99,7 +96,6 @@ class _ModbusWire:
             raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
-        """Write the bytes of a block."""
         registers = list(struct.unpack(f">{len(data) // 2}H", data))
         try:
             _good(self._client.write_registers(block.register, registers, device_id=self._device), block)
@@ -107,19 +103,16 @@ class _ModbusWire:
             raise _failed(error) from error
 
     def close(self) -> None:
-        """Disconnect."""
         with suppress(Exception):  # errors have no effect any longer
             self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:
-        """End all waits of the connection. Another thread calls this method."""
         connection = self._client.socket
         with suppress(OSError):
             if connection is not None:
                 connection.shutdown(socket.SHUT_RDWR)
 
     def reached(self) -> bool:
-        """True if the connection is open."""
         return self._client.connected
 
 

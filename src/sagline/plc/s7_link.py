@@ -65,7 +65,6 @@ class _S7Wire:
     """Connection to one PLC over S7."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Store the address. The method `open` connects."""
         with plc_packages():
             import snap7
             import snap7.client
@@ -78,31 +77,27 @@ class _S7Wire:
         self._client: Client | None = None
 
     def open(self) -> None:
-        """Connect. The library waits up to 5 s."""
         try:
             self._client = client = self._library.Client()
             client.set_param(self._library.type.Parameter.PDURequest, PDU)
-            client.connect(self._host, RACK, SLOT, tcp_port=self._port)
+            client.connect(self._host, RACK, SLOT, tcp_port=self._port)  # waits up to 5 s
             _socket(client).settimeout(ANSWER)
         except Exception as error:  # the library may raise any exception for an unknown answer
             raise WireError(refusal_of(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
-        """Read the bytes of a block."""
         try:
             return bytes(self._open.db_read(block.number, 0, block.size))
         except Exception as error:
             raise WireError(_no_access(error, block)) from error
 
     def write(self, block: Block, data: bytes) -> None:
-        """Write the bytes of a block."""
         try:
             self._open.db_write(block.number, 0, bytearray(data))
         except Exception as error:
             raise WireError(_no_access(error, block)) from error
 
     def close(self) -> None:
-        """Disconnect."""
         client, self._client = self._client, None
         with suppress(Exception):  # errors have no effect any longer
             if client is not None:
@@ -115,14 +110,12 @@ class _S7Wire:
         return self._client
 
     def abort(self) -> None:
-        """End all waits of the connection. Another thread calls this method."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:
                 _socket(client).shutdown(socket.SHUT_RDWR)
 
     def reached(self) -> bool:
-        """True if the connection is open."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:
@@ -150,7 +143,6 @@ def _socket(client: Client) -> socket.socket:
 
 
 def _no_access(error: Exception, block: Block) -> Refusal:
-    """Reason why a block was not read or written."""
     if isinstance(error, WireError):
         return error.refusal
     text = str(error)

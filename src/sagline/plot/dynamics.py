@@ -213,9 +213,7 @@ def response(
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
-        >>> found = sl.vibration(sl.inverse(robot, pose).state, up_to=20.0)
+        >>> found = sl.vibration(sl.load_robot("cogiro"), (1.0, 0.5, 2.0), up_to=20.0)
         >>> axes = sl.plot.response(found)
     """
     if isinstance(vibration, FrequencyResponse):

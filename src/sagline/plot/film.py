@@ -46,9 +46,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
     Examples:
         >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")  # doctest: +SKIP
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)  # doctest: +SKIP
-        >>> state = sl.inverse(robot, pose).state  # doctest: +SKIP
-        >>> found = sl.vibration(state, up_to=20.0)  # doctest: +SKIP
+        >>> found = sl.vibration(robot, (1.0, 0.5, 2.0), up_to=20.0)  # doctest: +SKIP
         >>> sl.plot.film(found, 1, "mode.gif")  # doctest: +SKIP
     """
     path = file_path(file)

@@ -22,17 +22,12 @@ ALONG = 3.0  # largest hidden length of a line nearly parallel to a strip, divid
 
 
 class FlatLine(NamedTuple):
-    """A line in the picture.
+    """A line in the picture."""
 
-    Attributes:
-        points: Coordinates to the right, up, and toward the viewer [m], shape (P, 3).
-        half_width: Half of the width [m] within which the line hides lines behind it; 0 if it hides nothing.
-        gap: Additional distance at crossings [m]. A line is not hidden if it is less than half_width + gap behind this
-            line, as is a cable that ends at the same anchor.
-    """
-
-    points: Array
-    half_width: float
+    points: Array  # coordinates to the right, up, and toward the viewer [m], shape (P, 3)
+    half_width: float  # half of the width [m] within which the line hides lines behind it; 0 if it hides nothing
+    # Additional distance at crossings [m]: a line is not hidden if it is less than half_width + gap behind this line, as
+    # is a cable that ends at the same anchor.
     gap: float
 
 

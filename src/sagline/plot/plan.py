@@ -55,9 +55,8 @@ def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(robot, path)
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
         >>> axes = sl.plot.tensions(plan)
     """
     ax = sheet.axes_or_new(ax)
@@ -82,9 +81,8 @@ def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = N
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(robot, path)
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
         >>> axes = sl.plot.lengths(plan)
     """
     ax = sheet.axes_or_new(ax)
@@ -104,9 +102,8 @@ def overview(plan: Plan) -> Figure:
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(robot, path)
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
         >>> figure = sl.plot.overview(plan)
     """
     rows, columns, height = (4, 1, 9.0) if current().narrow else (2, 2, 5.0)
@@ -162,9 +159,8 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(robot, path)
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
         >>> axes = sl.plot.error(sl.confirm(plan))
     """
     ax = sheet.axes_or_new(ax, height=2.6)
@@ -251,9 +247,8 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(robot, path)
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
         >>> figure = sl.plot.small_multiples(plan)
     """
     values, label = _values(plan, quantity, TENSIONS | LENGTHS)

@@ -54,9 +54,8 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
-        >>> axes = sl.plot.polygon(sl.tension_polygon(robot, pose))
+        >>> polygon = sl.tension_polygon(sl.load_robot("cogiro"), (1.0, 0.5, 2.0))
+        >>> axes = sl.plot.polygon(polygon)
     """
     if instance(shape, TensionPolygon, "shape").vertices.shape[1] != 2 or len(shape.vertices) == 0:
         value = f"{len(shape.vertices)} points with {shape.vertices.shape[1]} coordinates"

@@ -82,9 +82,7 @@ def energy(simulation: Simulation) -> Figure:
 
     Examples:
         >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
-        >>> motion = sl.simulate(sl.inverse(robot, pose).state, duration=0.5)
+        >>> motion = sl.simulate(sl.load_robot("cogiro"), (1.0, 0.5, 2.0), duration=0.5)
         >>> figure = sl.plot.energy(motion)
     """
     balance, time = instance(simulation, Simulation, "simulation").energy, simulation.time

@@ -17,29 +17,17 @@ SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # largest heights of a figure [in]
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """A style of figures, activated by `style`.
+    """A style of figures, activated by `style`."""
 
-    Attributes:
-        name: Name of the style; "" for the style of the documentation.
-        width: Width of every figure [in].
-        height: Factor by which heights of figures are multiplied; 1 in the documentation.
-        tallest: Largest height of a figure [in].
-        font: Font family of all text.
-        mathematics: Matplotlib's name for the font of formulas.
-        label: Font size of axis labels, titles and labels of bars [pt].
-        tick: Font size of numbers and of the names of lines [pt].
-        line: Factor by which line widths and marker sizes are multiplied; 1 in the documentation.
-    """
-
-    name: str
-    width: float
-    height: float
-    tallest: float
-    font: str
-    mathematics: str
-    label: float
-    tick: float
-    line: float
+    name: str  # "" for the style of the documentation
+    width: float  # width of every figure [in]
+    height: float  # factor by which heights of figures are multiplied; 1 in the documentation
+    tallest: float  # largest height of a figure [in]
+    font: str  # font family of all text
+    mathematics: str  # Matplotlib's name for the font of formulas
+    label: float  # font size of axis labels, titles and labels of bars [pt]
+    tick: float  # font size of numbers and of the names of lines [pt]
+    line: float  # factor by which line widths and marker sizes are multiplied; 1 in the documentation
 
     def size(self, height: float) -> tuple[float, float]:
         """Width and height [in] of a figure in this style, from the requested height."""

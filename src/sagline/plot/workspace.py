@@ -17,7 +17,7 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.plot.geometry import Find, cut_at_limits
+from sagline.plot.geometry import Find, cut_at_limits, view_axes
 from sagline.plot.labels import PLACE, set_heading
 from sagline.plot.robot import draw_robot, format_space_axes
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, format_axes, sheet
@@ -137,9 +137,10 @@ def _limit_name(key: Key, space: Workspace) -> str:
 def _limit_colors(space: Workspace) -> dict[Key, Color]:
     """Colors of all possible limits. A limit has the same color in all figures of a workspace."""
     count = space.robot.cable_count
-    colors = {(0, cable): _shade(cable_color(cable)) for cable in range(-1, count)}
+    colors = {(0, cable): cable_color(cable) for cable in range(-1, count)}
     others = [(which, cable) for which in range(1, len(space.criteria)) for cable in range(-1, count)]
-    return colors | {key: _shade(CABLES[-1 - k % len(CABLES)]) for k, key in enumerate(others)}
+    colors |= {key: CABLES[-1 - k % len(CABLES)] for k, key in enumerate(others)}
+    return {key: (red / 255.0, green / 255.0, blue / 255.0) for key, (red, green, blue) in colors.items()}
 
 
 def _limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
@@ -151,12 +152,6 @@ def _limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
         return np.array([index[key] for key in zip(found.criterion.tolist(), found.cable.tolist(), strict=True)])
 
     return find
-
-
-def _shade(color: tuple[int, int, int]) -> Color:
-    """Color as three numbers, in the form of matplotlib."""
-    red, green, blue = color
-    return red / 255.0, green / 255.0, blue / 255.0
 
 
 def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers: Sequence[Text]) -> None:
@@ -325,7 +320,7 @@ def _place(space: Workspace) -> Pose:
     return inverse(space.robot, pose, given=space.given).state.pose
 
 
-def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
+def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, Color]) -> None:
     """Draw the faces of the hull in the colors of their limits, divided where the limit changes."""
     chosen, faces = _coarser(space.surface.vertices, space.surface.faces)
     if not len(faces):
@@ -342,8 +337,7 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
     corners = np.concatenate((corners, walls))
     shades = np.concatenate((shades, np.tile(to_rgb(GAP_COLOR), (len(walls), 1))))
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    turn, up = np.radians([ax.azim, ax.elev])
-    toward = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+    toward = view_axes(*np.radians([ax.azim, ax.elev]))[2]
     for there, opacity, order in ((normals @ toward <= 0.0, FAR_SIDE, 1.6), (normals @ toward > 0.0, NEAR_SIDE, 2.2)):
         shown = Poly3DCollection(corners[there], facecolors=shades[there], alpha=opacity, linewidth=0.0, zorder=order)
         shown.set_rasterized(True)
@@ -363,7 +357,7 @@ def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
     return first, joined[kept]
 
 
-def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
+def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, Color]) -> None:
     """Draw the shares of the limits in the surface as bars. The largest share is at the top."""
     keys = [(limit.number, limit.cable) for limit in space.limits]
     bars = [

@@ -124,10 +124,8 @@ def _winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
 
 
 def _check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
-    """Refuse a `step` [s] that is too long for the robot's modes. Refuse a `period` [s] out of range.
-
-    The period must be a whole multiple of the step, and at most the heartbeat.
-    """
+    """Refuse a `step` [s] that is too long for the robot's modes. Refuse a `period` [s] out of range."""
+    # the period must be a whole multiple of the step, and at most the heartbeat
     if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
         raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
     if period > HEARTBEAT:
@@ -190,12 +188,7 @@ LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # indices of the rows of the re
 
 
 class Hardware:
-    """Drives, sensors and plant.
-
-    Attributes:
-        counts: Encoder counts, whole numbers as floats, shape (m,).
-        limits: Limits of the winches in the PLCs.
-    """
+    """Drives, sensors and plant."""
 
     def __init__(
         self,
@@ -248,7 +241,6 @@ class Hardware:
         self._take(self._simulator.step(targets, self._period, tension=tension, wrench=weight))
 
     def _switch(self, powered: list[bool]) -> None:
-        """Switch the power of drives on or off."""
         changed = [i for i, (now, before) in enumerate(zip(powered, self._powered, strict=True)) if now != before]
         if on := [i for i in changed if powered[i]]:
             self._simulator.release(*on)
@@ -257,9 +249,8 @@ class Hardware:
         self._powered, self._torque_of_force = list(powered), self._lever * powered
 
     def _take(self, reading: Reading) -> None:
-        """Update the readings of encoders, drives and cells."""
         length, rate, torque, tension, filtered = self._rows
-        self.counts = np.rint(self._true.counts(reading.length) + self._slip)
+        self.counts = np.rint(self._true.counts(reading.length) + self._slip)  # of the encoders, whole numbers
         now = self._nominal.lengths(self.counts)
         np.subtract(now, length, out=rate)
         rate /= self._periods

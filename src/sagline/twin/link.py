@@ -54,38 +54,31 @@ class PlcBlocks:
         # owners: ids of the controllers that own the groups, as plain numbers
         self.owners: list[int] = arrays[FIRST][OWNER].tolist()
 
+    def copy(self) -> PlcBlocks:
+        """Copy of the blocks."""
+        floats, whole, groups, clocks = self.arrays
+        return PlcBlocks((floats.copy(), whole.copy(), groups.copy(), clocks.copy()))
+
     def counter(self, group: int) -> int:
         """Counter of a group's block."""
         return int(self.arrays[FIRST][COUNTER, group])
 
-    def keep(self, group: int, part: slice, before: PlcBlocks) -> None:
-        """Restore the data of a group from earlier blocks."""
-        for k, (array, old) in enumerate(zip(self.arrays, before.arrays, strict=True)):
+    def keep(self, group: int, part: slice, other: PlcBlocks) -> None:
+        """Replace the data of a group, with the winches `part`, by those of other blocks."""
+        for k, (array, own) in enumerate(zip(self.arrays, other.arrays, strict=True)):
             where = part if k < FIRST else group
-            array[..., where] = old[..., where]
-        self.owners[group] = before.owners[group]
+            array[..., where] = own[..., where]
+        self.owners[group] = other.owners[group]
 
 
 class Report(NamedTuple):
     """Content of the block of one group, as servers need it.
 
+    Fields of `Sample` have the same meanings and units here, with a number of the group or a list of its winches.
+
     Attributes:
-        counter: Block counter, at the beginning of the block.
         counter_again: Block counter at the end of the block. The counters of an incomplete block differ.
         foreign: True if the block belongs to another program.
-        plc_time: Clock of the PLC [s].
-        owner: Id of the controller that owns the group, 0 for none.
-        echo: Counter of the last accepted command.
-        status: Bits of `GroupStatus`.
-        fault: Code of `GroupFault`.
-        length: Lengths of the group's winches [m].
-        rate: Rates of these lengths [m/s].
-        torque: Torques of the motors [N m].
-        tension: Readings of the load cells [N].
-        filtered: Filtered readings of the load cells [N].
-        counts: Encoder counts.
-        state: Codes of `WinchState`.
-        winch_fault: Fault codes of the drives.
     """
 
     counter: int
@@ -114,25 +107,16 @@ HISTORY: Final = 100  # number of earlier blocks that are kept for the fault "go
 
 
 class _Driven(Protocol):
-    """The part of a machine's interface that a link uses."""
+    """The part of the interface of `Machine` that a link uses."""
 
     @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The winches of each group."""
-
+    def groups(self) -> tuple[tuple[int, ...], ...]: ...
     @property
-    def period(self) -> float:
-        """Period of one exchange [s]."""
-
+    def period(self) -> float: ...
     @property
-    def time(self) -> float:
-        """Time since the machine was switched on [s]."""
-
-    def deliver(self, group: int, message: int | Order) -> None:
-        """Deliver a claim or a command to a PLC."""
-
-    def advance(self) -> None:
-        """Simulate one period."""
+    def time(self) -> float: ...
+    def deliver(self, group: int, message: int | Order) -> None: ...
+    def advance(self) -> None: ...
 
 
 class MachineLink:
@@ -250,30 +234,18 @@ class MachineLink:
         self._owner[group] = block.owners[group]
 
     def _look(self, now: float) -> Sample | Missing:
-        newest = self._newest
-        first = newest[0]
-        if first is not None and newest.count(first) == len(newest):
-            floats, whole, groups, clock = first.arrays
-            floats, whole, groups, clock = floats.copy(), whole.copy(), groups.copy(), clock.copy()
-        else:
-            silent = tuple(group for group, block in enumerate(newest) if block is None)
-            if silent:
-                return Missing(now, silent, ("no block has arrived yet",) * len(silent))
-            floats, whole, groups, clock = self._mixed([block for block in newest if block is not None])
-        age = now - self._arrival
-        counter, owner, echo, status, fault = groups
+        newest = [block for block in self._newest if block is not None]
+        if len(newest) < len(self._newest):
+            silent = tuple(group for group, block in enumerate(self._newest) if block is None)
+            return Missing(now, silent, ("no block has arrived yet",) * len(silent))
+        blocks = newest[0].copy()
+        for group, block in enumerate(newest):
+            if block is not newest[0]:
+                blocks.keep(group, self._parts[group], block)
+        floats, whole, (counter, owner, echo, status, fault), clock = blocks.arrays
         length, rate, torque, tension, filtered = floats
         counts, state, winch_fault = whole
         return Sample(
-            now, age, counter, clock, owner, echo, status, fault,
+            now, now - self._arrival, counter, clock, owner, echo, status, fault,
             length, rate, torque, tension, filtered, counts, state, winch_fault, self._discarded.copy(), self._reasons,
         )  # fmt: skip
-
-    def _mixed(self, newest: list[PlcBlocks]) -> tuple[Any, ...]:
-        """Arrays that contain the newest block of each group."""
-        found = tuple(array.copy() for array in newest[0].arrays)
-        for group, (part, block) in enumerate(zip(self._parts, newest, strict=True)):
-            for k, (array, own) in enumerate(zip(found, block.arrays, strict=True)):
-                where = part if k < FIRST else group
-                array[..., where] = own[..., where]
-        return found

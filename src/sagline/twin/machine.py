@@ -224,7 +224,6 @@ class Machine:
             link.after(self.time, self._snapshot, self._spoiled)
 
     def _scan(self, now: float) -> None:
-        """Scan all PLCs, and move the drives."""
         hardware = self._hardware
         encoder, cell = hardware.read[LENGTH].tolist(), hardware.read[CELL].tolist()
         length: list[float] = []
@@ -304,12 +303,10 @@ class Machine:
             self._schedule.add(found.time + found.duration, (False, found))
 
     def _apply_due_faults(self) -> None:
-        """Begin and end the due faults."""
         for _, (begins, what) in self._schedule.due(self.time):
             self._apply_fault(what, begins)
 
     def _apply_fault(self, what: Injected, begins: bool) -> None:
-        """Begin or end a fault."""
         hardware, which, value = self._hardware, what.which, what.value
         item, words = KINDS[what.kind].item, KINDS[what.kind].words
         if item == "cell":
@@ -333,7 +330,6 @@ class Machine:
             hardware.limit_force(which, value)
 
     def _spoil_group(self, group: int, words: str, begins: bool) -> None:
-        """Begin or end a fault of a group."""
         kept = {"is taken": self._taken, "stops": self._stopped}.get(words)
         if kept is not None:
             (kept.add if begins else kept.discard)(group)

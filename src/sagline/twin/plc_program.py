@@ -56,10 +56,7 @@ class PlcLimits(NamedTuple):
 
 
 class Program:
-    """Program of one group.
-
-    The inputs of the program are the command, the encoders and the load cells. The outputs are the attributes.
-    """
+    """Program of one group. Inputs: command, encoders and load cells. Outputs: the attributes."""
 
     def __init__(self, limits: PlcLimits, period: float) -> None:
         """Begin with brakes on and without an owner. `period`: period of a scan [s]."""
@@ -196,10 +193,8 @@ class Program:
         self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, _LEAVE
 
     def _switch(self, order: Order, encoder: list[float]) -> None:
-        """Switch on the enabled drives at their present lengths, and switch off all others.
-
-        A drive first produces the expected tension. The next command releases its brake.
-        """
+        """Switch on the enabled drives at their present lengths, and switch off all others."""
+        # A drive first produces the expected tension. The next command releases its brake.
         self.length, self._target, self._rate = list(self.length), list(self._target), list(self._rate)
         for i in self.winches:
             has = order.enable[i] and (self.powered[i] or self._loaded[i])
@@ -211,7 +206,6 @@ class Program:
         self._loaded = order.enable
 
     def _obey(self, order: Order, waited: float, cell: list[float]) -> None:
-        """Execute a new command."""
         if order.mode == _FOLLOW and any(self.powered):
             self._follow(order, waited, cell)
             return
@@ -253,11 +247,9 @@ class Program:
         self._drive(cell)
 
     def _drive(self, cell: list[float]) -> None:
-        """Advance the set points by a scan. A cable beyond its tension limit is not wound in.
-
-        Within one cycle, the set points move linearly to those of the last command. After the cycle, the set points
-        continue at the rates of the command. Lengths and rates stay within their limits.
-        """
+        """Advance the set points by a scan. A cable beyond its tension limit is not wound in."""
+        # Within one cycle, the set points move linearly to those of the last command. After the cycle, the set points
+        # continue at the rates of the command. Lengths and rates stay within their limits.
         limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []
         beyond = max(period - left, 0.0)

@@ -21,7 +21,6 @@ class _S71200(Server):
     """S7 server that has the PDU size of an S7-1200 and can close its connections."""
 
     def __init__(self) -> None:
-        """Begin without connections."""
         super().__init__(log=False)
         self._sockets: set[socket.socket] = set()
 
@@ -41,7 +40,6 @@ class _S71200(Server):
         return 0
 
     def disconnect_all(self) -> None:
-        """Close all connections."""
         for client in list(self._sockets):
             with suppress(OSError):
                 client.shutdown(socket.SHUT_RDWR)

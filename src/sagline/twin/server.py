@@ -167,11 +167,9 @@ SWITCHING_ON: Final = 60.0  # longest time for the start of the process [s], inc
 def machine_in_process(
     robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0
 ) -> Iterator[tuple[tuple[str, ...], Callable[[], Array]]]:
-    """Context with a machine that runs in another process in real time. The end of the context kills the process.
-
-    The value has the address of each group's PLC, "host:port", and a function that returns the true position of the
-    platform's origin after the last scan [m], shape (3,).
-    """
+    """Context with a machine that runs in another process in real time. The end of the context kills the process."""
+    # the value has the address of each group's PLC, "host:port", and a function that returns the true position of the
+    # platform's origin after the last scan [m], shape (3,)
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     place = context.Array("d", 3)

@@ -38,27 +38,22 @@ Answer = Callable[[ServerConnection, Request], Response | None]
 
 
 class Access:
-    """Access to the page of a server.
-
-    Attributes:
-        path: First part of the path of every address, a slash and the token; "" without a token.
-        local: True if the server listens on a loopback address.
-        guards: True after the server has begun to check its requests.
-    """
+    """Access to the page of a server."""
 
     def __init__(self, host: str, *, token: bool, clients: int, allow_host: Sequence[str]) -> None:
         """Make a token; the arguments are those of `start_server`."""
         self._clients = whole_number(clients, "clients", 1, MOST_CLIENTS)
+        # path: first part of the path of every address, a slash and the token; "" without a token
         self.path = f"/{secrets.token_urlsafe(_ENTROPY)}" if flag(token, "token") else ""
         self._allowed = frozenset(map(_allowed_host, elements(allow_host, str, "allow_host", "Give a list.")))
         own = _host_of(bracketed(host))
-        self.local = own is not None and _is_loopback(own)
+        self.local = own is not None and _is_loopback(own)  # True if the server listens on a loopback address
         names = (own, None if self.local else gethostname().lower(), *self._allowed)
         self._names = frozenset(name for name in names if name)
         self._once: set[str] = set()  # paths that can be used once
         self._connected = 0
         self._reported: dict[str, float] = {}  # time of the last line about each kind of rejection [s]
-        self.guards = False
+        self.guards = False  # True after the server has begun to check its requests
 
     def path_once(self) -> str:
         """Path that opens the page a single time; other users of this computer can read a browser's command line."""

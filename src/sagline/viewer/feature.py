@@ -44,12 +44,10 @@ class Feature:
     """Base of a feature of the page: its controls, drawing, text and reactions. The base does nothing.
 
     A feature is created once, with the `Page`. The serving thread calls all its methods.
-
-    Attributes:
-        live: True if the feature follows every view of a drag that changes its key, unless the key is None, because it
-            draws at the pose. Others follow up to 20 views per second.
     """
 
+    # True if the feature follows every view of a drag that changes its key, unless the key is None, because it draws at
+    # the pose. Others follow up to 20 views per second.
     live: bool = False
     _task: BackgroundTask | None = None  # background task of a feature that has one
 

@@ -126,7 +126,6 @@ class LinkedControls:
 
 
 def _text(handle: Any) -> str:
-    """Text of the value of a control."""
     value = handle.value
     if isinstance(handle, viser.GuiCheckboxHandle):
         return str(int(value))
@@ -138,7 +137,6 @@ def _text(handle: Any) -> str:
 
 
 def _value(handle: Any, name: str, text: str) -> Any:
-    """Value of a control from its text."""
     if isinstance(handle, _NUMBERS):
         number = _number(text, name, handle.min, handle.max)
         return int(number) if isinstance(handle.value, int) else number

@@ -62,33 +62,9 @@ class Source(NamedTuple):
 
 
 class Page:
-    """Page of a robot, optionally with a run or simulation. The caller starts and stops the server.
+    """Page of a robot, optionally with a run or simulation. The caller starts and stops the server."""
 
-    Only the thread of `serve` uses the state of the page. Other threads call only `later`, `refresh`, `extend` and
-    `stop`.
-
-    Attributes:
-        server: A running server with an empty page.
-        robot: The robot; if a motion is played, its robot.
-        channel: Messages between the server and browsers.
-        panel: Controls and displayed values; a feature adds a tab to `panel.readings`.
-        scene: The robot in the scene.
-        player: Player of a run, a simulation or a log.
-        framing: Cameras of the clients.
-        scale: Colors of tensions.
-        size: Size of the robot [m].
-        home: Initial pose of the platform.
-        extent: Lowest and highest corner of everything that is drawn [m].
-        wrench: External wrench on the platform while it is dragged, shape (6,), as in `inverse`; None if there is none.
-        found: A calibration of the robot to show; None if there is none.
-        mode: Name of the initially animated mode, "1" or "massless 1"; "" if there is none.
-        source: Expressions for the objects with which the page was opened.
-        view: The shown view; None at first. It is replaced after all features have followed the new view.
-        features: All features, in the order of their updates.
-        updates: Number of views that were shown.
-        dragging: Clients that drag the platform.
-        previous: Plan of the previous pose, for a method that depends on history; None without one.
-    """
+    # Only the thread of `serve` uses the state of the page. Other threads call `later`, `refresh`, `extend` and `stop`.
 
     def __init__(
         self,
@@ -105,12 +81,15 @@ class Page:
         given: tuple[Given, ...] | None = None,
         stopping: threading.Event | None = None,
     ) -> None:
-        """Build the page.
-
-        `beside` is a second run of the robot with the same clock. `given`: given values of an underconstrained
-        platform, as in `inverse`. `stopping`, when set, ends `serve`.
-        Other arguments: see the class.
-        """
+        """Build the page of a running `server` without contents."""
+        # robot: if a motion is played, its robot
+        # wrench: external wrench on the platform while it is dragged, shape (6,), as in `inverse`; None for zero
+        # mode: name of the initially animated mode, "1" or "massless 1"; "" for none
+        # found: a calibration of the robot to show
+        # source: expressions for the objects with which the page was opened
+        # beside: a second run of the robot with the same clock
+        # given: given values of an underconstrained platform, as in `inverse`
+        # stopping: event that ends `serve`
         self.server, self.robot, self.wrench = server, robot, wrench
         self.mode, self.found, self.source = mode, found, source or Source()
         self._wake, self._stopping = threading.Event(), stopping or threading.Event()
@@ -120,17 +99,17 @@ class Page:
         server.on_client_connect(self.channel.connect)
         server.on_client_disconnect(self.channel.disconnect)
         home = home_pose(robot) if played is None else played.at(0.0).pose
-        self.home = home if pose is None else pose
+        self.home = home if pose is None else pose  # initial pose of the platform
         forget = partial(self.later, self._forget)
         self.panel = ControlPanel(server, robot, self.scale, self.refresh, forget, given)
         self.scene = RobotScene(server.scene, robot, self.home)
-        self.extent = self.scene.extent(self.home)
+        self.extent = self.scene.extent(self.home)  # lowest and highest corner of everything that is drawn [m]
         self.framing = Framing(server, *self.extent)
-        self.view: View | None = None
-        self.updates = 0
-        self.dragging: set[int | None] = set()
-        self.previous: Plan | None = None
-        self.features: tuple[Feature, ...] = ()
+        self.view: View | None = None  # the shown view, which is replaced after all features have followed the new view
+        self.updates = 0  # number of views that were shown
+        self.dragging: set[int | None] = set()  # clients that drag the platform
+        self.previous: Plan | None = None  # plan of the previous pose, for a method that depends on history
+        self.features: tuple[Feature, ...] = ()  # in the order of their updates
         self.player = Player(played, self._put_on, beside)
         self.features = tuple(feature for make in features if (feature := make(self)) is not None)
         self._build_gizmo()
@@ -175,10 +154,8 @@ class Page:
         self._wake.set()
 
     def extend(self, played: Played) -> None:
-        """Replace the played motion by a longer version of it; any thread may call this method.
-
-        A clock at its end moves to the new end; a clock at an earlier time stays there.
-        """
+        """Replace the played motion by a longer version of it; any thread may call this method."""
+        # a clock at its end moves to the new end; a clock at an earlier time stays there
         self.later(lambda: self.player.extend(played))
 
     def stop(self) -> None:
@@ -232,7 +209,6 @@ class Page:
         return SOON if any(feature.waiting for feature in self.features) else IDLE
 
     def _put_on(self, played: Played | None) -> None:
-        """Play another motion, or stop playing."""
         self._traced = None, 0.0
         if played is None:
             self.scene.show_traces(np.empty((0, 3)), np.empty((0, 3)))
@@ -258,7 +234,6 @@ class Page:
         self.previous = None
 
     def _update(self) -> None:
-        """Solve and show the present state once."""
         self._draw()
         self._follow()
 

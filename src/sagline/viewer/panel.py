@@ -30,17 +30,7 @@ _LIGHTEST, _HEAVIEST = 0.1, 4.0  # limits relative to the robot's mass
 
 
 class ControlPanel:
-    """Sliders, choices and displayed values.
-
-    Attributes:
-        readings: Panel of the displayed values.
-        verdict: Verdict on the pose, or the reason why a setting is invalid.
-        numbers: Numbers of the pose and of the cables.
-        polygon: Feasible tensions.
-        ghost: Choice of straight cables beside the sagging ones.
-        method: Choice of the tension distribution method.
-        method_name: Name of the last chosen method, except for tensions by hand.
-    """
+    """Sliders, choices and displayed values."""
 
     def __init__(
         self,
@@ -54,7 +44,7 @@ class ControlPanel:
         """Build the panels. Any thread calls `changed` after a change of a value, and `forget` to reset the history."""
         self._gui, self._robot, self._limits, self._given = server.gui, robot, scale, given
         self._changed, self._forget = changed, forget
-        self.method_name = next(iter(METHODS))
+        self.method_name = next(iter(METHODS))  # name of the last chosen method, except for tensions by hand
         self._by_hand: ByHand | None = None
         self._shown_scale = scale  # scale of the legend
         self._sliders: dict[str, viser.GuiHtmlHandle] = {}  # sliders of the factors by their labels
@@ -64,10 +54,10 @@ class ControlPanel:
         self._build_drawing()
         readings = self.readings = self._gui.add_panel()
         with readings.add_tab("Readings"):
-            self.verdict = self._gui.add_html("")
+            self.verdict = self._gui.add_html("")  # verdict on the pose, or the reason why a setting is invalid
             self._explained = self._gui.add_html("", visible=False)
             self._legend = self._gui.add_html(readout.legend(scale, robot))
-            self.numbers = self._gui.add_html("")
+            self.numbers = self._gui.add_html("")  # numbers of the pose and of the cables
             with self._gui.add_folder("Feasible tensions"):
                 self.polygon = self._gui.add_html("")
         with readings.add_tab("Control"):  # for small screens; see browser/control.js
@@ -164,10 +154,8 @@ class ControlPanel:
         self._watch(self._mass, self._model, self.method)
 
     def _add_factor(self, label: str, low: float, high: float, hint: str, least: float | None = None) -> Any:
-        """Add a factor, initially 1, with a logarithmic slider; its left end is `least` (possibly 0), not `low`.
-
-        The slider is HTML that browser/factors.js connects with the hidden number: sliders of viser are linear.
-        """
+        """Add a factor, initially 1, with a logarithmic slider; its left end is `least` (possibly 0), not `low`."""
+        # the slider is HTML that browser/factors.js connects with the hidden number: sliders of viser are linear
         least = low if least is None else least
         self._sliders[label] = self._gui.add_html(readout.factor_slider(label, low, high, least, hint))
         number = self._gui.add_number(label, 1.0, min=least, max=high, step=0.1, visible=False)
@@ -195,7 +183,6 @@ class ControlPanel:
 
 
 def _slid(slider: Any) -> float:
-    """The value of a slider."""
     value, low, high = float(slider.value), float(slider.min), float(slider.max)
     if not low <= value <= high:
         raise InvalidValueError(slider.label, value, f"{low:g} to {high:g}", "Move the slider.")

@@ -32,7 +32,6 @@ NO_CHOICE: Final = "In motion, tensions are not chosen: they follow from the len
 
 
 def _event_text(event: Occurrence, unit: ForceUnit) -> str:
-    """Description of an event."""
     before, after = unit.bare(event.tension_before), unit.written(event.tension_after)
     return f"{event.text} at {event.time:.3f} s: {before} before, then at most {after}"
 

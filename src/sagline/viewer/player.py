@@ -128,23 +128,15 @@ class PlayerState(NamedTuple):
 
 
 class Player:
-    """Player of a run, a simulation or a log, with its clock.
-
-    Attributes:
-        played: Played motion; None if there is none.
-        time: Shown time of the motion [s], 0 to duration.
-        duration: Time of the end [s].
-        playing: True if the clock runs.
-        following: True if the motion is shown, False for a pose of the user.
-        speed: Ratio of the time of the motion to real time.
-        number: Number of the played motion; a longer version has the same number.
-    """
+    """Player of a run, a simulation or a log, with its clock."""
 
     def __init__(
         self, original: Played | None, put_on: Callable[[Played | None], None], beside: Beside | None = None
     ) -> None:
         """Play the motion `original`, or no motion for None. `put_on` is called whenever another motion is played."""
         self._put_on, self._original, self._beside = put_on, original, beside
+        # speed: ratio of the time of the motion to real time
+        # number: number of the played motion; a longer version has the same number
         self.speed, self.number = 1.0, 0
         self.play(original)
 
@@ -160,6 +152,9 @@ class Player:
 
     def play(self, played: Played | None, *, at_once: bool = False) -> None:
         """Play another motion, or stop playing."""
+        # time: shown time of the motion [s], 0 to `duration`
+        # playing: True if the clock runs
+        # following: True if the motion is shown, False for a pose of the user
         self._replace(played)
         self.time, self.playing, self.following = 0.0, at_once, played is not None
         self.number += 1

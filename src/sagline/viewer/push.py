@@ -118,9 +118,8 @@ def _reserve(state: Equilibrium, push: Push) -> Reserve:
     def margins(forces: Array) -> tuple[Array, Flags, Flags]:
         found = forward(robot, lengths, state.pose, state.cables.model, unit.wrench(state, forces))
         tension = found.state.limited_tension
-        above = robot.tension_max - tension < tension - robot.tension_min
-        margin = np.where(above, robot.tension_max - tension, tension - robot.tension_min)
-        return margin, above, found.solved
+        to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
+        return np.minimum(to_lower, to_upper), to_upper < to_lower, found.solved
 
     def is_exceeded(forces: Array) -> Flags:
         margin, _, solved = margins(forces)

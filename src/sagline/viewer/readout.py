@@ -63,10 +63,8 @@ def refused(message: str) -> str:
 def numbers_html(
     snapshot: Snapshot, scale: TensionScale, frequencies: Array | None, compromise: Equilibrium | None = None
 ) -> str:
-    """The pose, the numbers of every cable, and the platform's natural frequencies.
-
-    At an infeasible pose, `compromise` contains the tensions within the limits that are nearest to force balance.
-    """
+    """The pose, the numbers of every cable, and the platform's natural frequencies."""
+    # at an infeasible pose, `compromise` contains the tensions within the limits that are nearest to force balance
     state = compromise if compromise is not None else None if snapshot.plan is None else snapshot.plan.state
     parts = (
         pose_line(snapshot.pose),

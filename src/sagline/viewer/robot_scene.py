@@ -24,11 +24,7 @@ from sagline.viewer.tension_scale import Colors, TensionScale
 
 
 class Nodes:
-    """Nodes of a scene by name. A node is created when it is first drawn, and updated afterward.
-
-    Attributes:
-        scene: The scene.
-    """
+    """Nodes of a scene by name. A node is created when it is first drawn, and updated afterward."""
 
     def __init__(self, scene: viser.SceneApi, pixel: float = 0.0) -> None:
         """Begin without nodes; `pixel` is the size of a pixel [m], 0 for line widths in pixels of the screen."""
@@ -228,10 +224,8 @@ class RobotScene:
             self._nodes.lines(name, pairs[np.isfinite(pairs).all(axis=(1, 2))], color, TRACE_WIDTH)
 
     def _build_lights(self) -> None:
-        """Add light from above and below without shadows and environment map, for computers without a graphics card.
-
-        On such computers, the environment map of viser would block the page for five seconds.
-        """
+        """Add light from above and below without shadows and environment map, for computers without a graphics card."""
+        # on such computers, the environment map of viser would block the page for five seconds
         self._scene.configure_environment_map(hdri=None)
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_hemisphere(

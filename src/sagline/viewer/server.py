@@ -111,11 +111,7 @@ _quiet_process = ExitStack()  # suppresses the logs of the whole process while a
 
 
 class PageServer(viser.ViserServer):
-    """A viser server with the changed page; no page can make it open a tunnel to the internet.
-
-    Attributes:
-        access: The check of requests.
-    """
+    """A viser server with the changed page and checked requests; no page can make it open a tunnel to the internet."""
 
     def __init__(self, host: str, port: int, title: str, access: Access) -> None:
         """Start serving, with a title for the panel and the browser's tab."""
@@ -191,10 +187,8 @@ def stop_server(server: PageServer) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Context without log entries and warnings about disconnected clients, invalid messages and gimbal lock.
-
-    A rotation with gimbal lock has many sets of three angles; one of them is shown.
-    """
+    """Context without log entries and warnings about disconnected clients, invalid messages and gimbal lock."""
+    # a rotation with gimbal lock has many sets of three angles; one of them is shown
     levels = {name: logging.getLogger(name).level for name in LOUD}
     for name in LOUD:
         logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -302,10 +296,8 @@ class Channel(Messages):
             messages.send(topic, value)
 
     async def connect(self, client: viser.ClientHandle) -> None:
-        """Confirm to a client that its messages arrive from now on; viser drops earlier messages.
-
-        A coroutine without await runs before the next message of the client is read; a thread may run later.
-        """
+        """Confirm to a client that its messages arrive from now on; viser drops earlier messages."""
+        # a coroutine without await runs before the next message of the client is read; a thread may run later
         messages = self._clients[client.client_id] = Messages(client.gui)
         messages.send("welcome", True)
 

@@ -307,10 +307,8 @@ def error_ellipsoids(covariance: Array) -> tuple[Indices, Array, Array]:
 
 
 def placed_balls(lengths: Array, axes: Array) -> tuple[Array, Array]:
-    """Quaternions (k, 4), scalar first, and semi-axes (k, 3) of balls with semi-axes `lengths` along `axes` (k, 3, 3).
-
-    Thin ellipsoids become thicker, so that they are visible.
-    """
+    """Quaternions (k, 4), scalar first, and semi-axes (k, 3) of balls with `lengths` (k, 3) along `axes` (k, 3, 3)."""
+    # thin ellipsoids become thicker, so that they are visible
     axes = np.where(np.linalg.det(axes)[:, None, None] < 0.0, axes * [-1.0, 1.0, 1.0], axes)
     turns = Rotation.from_matrix(axes).as_quat()[:, [3, 0, 1, 2]]
     return turns, np.maximum(lengths, THINNEST * lengths.max(axis=1, keepdims=True))

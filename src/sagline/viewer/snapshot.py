@@ -212,11 +212,10 @@ class MethodMark(NamedTuple):
 
 
 class MethodMarks:
-    """Results of all tension distribution methods at a pose; they remain valid if only the chosen method changes.
+    """Results of all tension distribution methods at a pose; they remain valid if only the chosen method changes."""
 
-    For a moving robot, prepared solvers are about twelve times as fast. Their preparation takes longer than one
-    solution. A robot whose mass follows a slider therefore does not have prepared solvers.
-    """
+    # For a moving robot, prepared solvers are about twelve times as fast. Their preparation takes longer than one
+    # solution. A robot whose mass follows a slider therefore does not have prepared solvers.
 
     def __init__(self) -> None:
         """Begin without results."""

@@ -215,10 +215,8 @@ _OPACITIES: Final = (0.6, 0.35, 0.15)  # opacity in each ring; two patches lie b
 
 
 def near_patches(hull: Hull, position: Array, reach: float) -> list[Patch]:
-    """Patches of the wall within `reach`, in the colors of the limiting cables. Nearer patches are more opaque.
-
-    The faces of the robot's box are not a wall.
-    """
+    """Patches of the wall within `reach`, in the colors of the limiting cables. Nearer patches are more opaque."""
+    # the faces of the robot's box are not a wall
     near = np.linalg.norm(hull.vertices - position, axis=1) < reach + hull.longest
     faces_near = np.flatnonzero(near[hull.faces].any(axis=1) & ~hull.on_box)
     corners, owner = _quartered(hull.vertices[hull.faces[faces_near]]), np.repeat(hull.owner[faces_near], 4)
@@ -264,7 +262,7 @@ NAMES: Final = ("+x", "+y", "+z", "−x", "−y", "−z")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FreeTravel:
+class _FreeTravel:
     """Free travel from a position in directions of the axes, at one orientation."""
 
     start: Array  # position [m], shape (3,)
@@ -289,7 +287,7 @@ def free_directions(robot: Robot, flat: int | None) -> Indices:
     return np.flatnonzero(np.abs(DIRECTIONS) @ free > 0.5)
 
 
-def free_travel(find: Find, start: Array, which: Indices, low: Array, high: Array) -> FreeTravel:
+def free_travel(find: Find, start: Array, which: Indices, low: Array, high: Array) -> _FreeTravel:
     """Distances from `start` along the directions `which` to the sign change of the margin, by a scan and bisection."""
     ways = DIRECTIONS[which]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -312,7 +310,7 @@ def free_travel(find: Find, start: Array, which: Indices, low: Array, high: Arra
         near = np.where(beyond, near, middle)
     distance, limiting = np.where(crossed, far, farthest), np.where(crossed, limiting, -1)
     margin = float(first.margin[0])
-    return FreeTravel(start, inside, margin, which, locked(distance), locked(crossed), locked(limiting))
+    return _FreeTravel(start, inside, margin, which, locked(distance), locked(crossed), locked(limiting))
 
 
 def _levels_at(find: Find, places: Array) -> tuple[Array, Indices]:
@@ -321,7 +319,7 @@ def _levels_at(find: Find, places: Array) -> tuple[Array, Indices]:
     return found.level.reshape(places.shape[:2]), found.cable.reshape(places.shape[:2])
 
 
-def travel_text(found: FreeTravel, unit: ForceUnit, without: str = "") -> str:
+def travel_text(found: _FreeTravel, unit: ForceUnit, without: str = "") -> str:
     """HTML: margin, nearest boundary with its limit, and a table of all directions."""
     head = f"<b>Margin</b> {unit.written(found.margin)}{without}<br>"
     crossed = [k for k in range(len(found.which)) if found.crossed[k]]

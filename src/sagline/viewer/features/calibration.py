@@ -81,7 +81,6 @@ def parameters_text(found: Calibration) -> str:
 
 
 def _outliers_text(found: Calibration, chosen: int | None) -> str:
-    """HTML of the outliers, each of them clickable."""
     if not found.outliers:
         return sentence("No outliers.")
     rows = "".join(
@@ -136,7 +135,6 @@ def _direction_text(one: Direction) -> str:
 
 
 def _root_mean_square(values: Array) -> float:
-    """Root mean square; NaN if a value is not finite."""
     return float(np.sqrt(np.mean(values**2))) if np.isfinite(values).all() else float("nan")
 
 
@@ -303,6 +301,5 @@ class CalibrationFeature(Feature):
         return sentence("The log has no such row.")
 
     def _pick(self, k: int) -> None:
-        """Select the row of a clicked dot."""
         if 0 <= k < len(self._drawn):
             self._field.value = str(int(self._found.rows[self._drawn[k]]))

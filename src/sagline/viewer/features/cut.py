@@ -172,7 +172,6 @@ class CutFeature(Feature):
 
     @property
     def _chosen(self) -> int:
-        """Number of the chosen cable."""
         return int(self._cable.value) if self._cable.value in self._cable.options else 0
 
     def _refuse(self, message: str) -> None:

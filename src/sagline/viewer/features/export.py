@@ -32,7 +32,7 @@ STRIP: Final = 4.0  # height of the legend in text sizes
 _STOPS = 16  # number of colors of the bar
 
 
-def strip_of(view: View, *remarks: str) -> dict[str, Any]:
+def _strip_of(view: View, *remarks: str) -> dict[str, Any]:
     """Texts and colors below a picture of a view, as JSON."""
     settings, scale = view.settings, view.scale
     unit = force_unit(view.snapshot.robot)
@@ -103,7 +103,7 @@ Take: TypeAlias = Callable[..., None]  # makes the page take a picture, "png" or
 
 
 @contextmanager
-def offscreen_scene(
+def _offscreen_scene(
     client: viser.ClientHandle,
     server: viser.ViserServer,
     shot: Shot,
@@ -202,7 +202,6 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
 
 
 def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], place: Any = None) -> None:
-    """Add a colored solid to a scene of trimesh."""
     import trimesh
 
     mesh = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
@@ -223,7 +222,6 @@ def moments(duration: float, speed: float) -> Array:
 
 
 def _clock(view: View, time: float, speed: float) -> dict[str, Any]:
-    """Texts of the strip for one picture."""
     digits = max(1, ceil(-log10(speed / RATE)))
     text = headline(view.snapshot) if isinstance(view.snapshot, Snapshot) else view.snapshot.notice
     return {"time": f"{time:.{digits}f} s", "text": "" if view.snapshot.solved else text}
@@ -233,7 +231,6 @@ class _Exporter:
     """Exports of one client, one at a time."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
-        """Begin without exports."""
         self.client = client
         self.messages = Messages(client.gui)
         self.busy = threading.Lock()
@@ -286,11 +283,11 @@ class ExportFeature(Feature):
         beneath = round(STRIP * text) if self._strip.value else 0
         shot = Shot.of(_camera_of(client), *self._page.extent, round(width * dots))
         about = {
-            **strip_of(view), "name": self._name(), "dots": dots, "text": text, "strip": beneath,
+            **_strip_of(view), "name": self._name(), "dots": dots, "text": text, "strip": beneath,
             "width": shot.width, "height": shot.height + beneath,
         }  # fmt: skip
         try:
-            with offscreen_scene(client, self._server, shot, view, LINE * dots / 72.0) as (_, take):
+            with _offscreen_scene(client, self._server, shot, view, LINE * dots / 72.0) as (_, take):
                 exporter.messages.send(PICTURE, about)
                 take("png")
         finally:
@@ -313,14 +310,14 @@ class ExportFeature(Feature):
         strip = round(STRIP * TEXT)
         pace = () if speed == 1.0 else (f"{speed:g} × its speed",)
         about = {
-            **strip_of(view, played.name, *pace), "name": f"{self._name()}-{played.name}", "count": len(times),
+            **_strip_of(view, played.name, *pace), "name": f"{self._name()}-{played.name}", "count": len(times),
             "rate": RATE, "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
         }  # fmt: skip
         shot = Shot.of(_camera_of(client), *self._page.extent, WIDTH, HEIGHT - strip)
         send(CLOCK, None)  # pictures without a clock do not belong to the film
         send(TOPIC, about)
         try:
-            with offscreen_scene(client, self._server, shot, view, LINE_WIDTH, played) as (show, take):
+            with _offscreen_scene(client, self._server, shot, view, LINE_WIDTH, played) as (show, take):
                 for time in times:
                     if exporter.cancelled.is_set():
                         return
@@ -332,7 +329,6 @@ class ExportFeature(Feature):
             send(TOPIC, None)  # a page with all pictures completes the film
 
     def _cancel(self, _: Any, client: int) -> None:
-        """Cancel the film of a client."""
         if client in self._exporters:
             self._exporters[client].cancelled.set()
 

@@ -111,7 +111,6 @@ class HistoryFeature(Feature):
             self._restore(self._first)
 
     def _record(self) -> None:
-        """Make one step of all changes since the last record."""
         try:
             taken = self._taken()
         except SaglineError:
@@ -123,7 +122,6 @@ class HistoryFeature(Feature):
         self._present = taken
 
     def _taken(self) -> Inputs:
-        """The present inputs."""
         page = self._page
         values, tension = page.feature(StateFeature).controls.values(), page.panel.settings().tension
         return Inputs(

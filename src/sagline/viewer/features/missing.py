@@ -72,7 +72,6 @@ def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str,
 
 
 def _other_rows(snapshot: Snapshot) -> list[tuple[str, str]]:
-    """Table rows without a known missing force."""
     status = snapshot.status
     if status in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED) and snapshot.plan is not None:
         other = OTHERWISE if status is PoseStatus.NOT_COVERED else "MinimumNorm"
@@ -142,7 +141,6 @@ class MissingFeature(Feature):
         self._explain()
 
     def _search(self) -> None:
-        """Start the computation of the nearest feasible pose."""
         assert self._shown is not None
         (snapshot, view), key = self._shown, self._key
         model, wrench = _load(snapshot, view)
@@ -175,7 +173,6 @@ class MissingFeature(Feature):
         nodes.lines("/nearest_way", shapes.segments(shapes.straight(ends), dashed=True), FEASIBLE, LINE_WIDTH)
 
     def _draw_force(self, snapshot: Snapshot, missing: MissingWrench | None) -> None:
-        """Draw the missing force at the center of mass."""
         size = 0.0 if missing is None else float(np.linalg.norm(missing.force))
         if missing is None or size == 0.0:
             self._nodes.hide("/missing", "/missing_name")
@@ -210,13 +207,11 @@ class MissingFeature(Feature):
         self._nodes.hide("/missing", "/missing_name", "/limits", "/nearest", "/nearest_way")
 
     def _go(self, _value: Any, _client: int) -> None:
-        """Go to the nearest feasible pose."""
         if self._nearest is not None and self._nearest_key == self._key:
             self._page.go(self._nearest.pose)
 
 
 def _load(snapshot: Snapshot, view: View) -> tuple[CableModel, Array | None]:
-    """Cable model and external wrench of a pose."""
     if snapshot.plan is None:
         return view.settings.model, view.wrench
     return snapshot.plan.state.cables.model, snapshot.plan.state.wrench

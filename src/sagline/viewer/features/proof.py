@@ -166,7 +166,6 @@ def _label(name: str, start: Array, way: Array, normal: Array, labels: list[Labe
 
 
 def _residual_text(state: Equilibrium, forces: tuple[_PlatformForce, ...], missing: Array | None) -> str:
-    """Sentence about the residual."""
     force, moment = residual(state, forces)
     left = n(force, ".2g", "N")
     if _can_rotate(state):

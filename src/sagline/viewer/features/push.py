@@ -55,7 +55,6 @@ def response_text(response: PushResponse, drawn_for: float | None) -> str:
 
 
 def _motion_text(response: PushResponse) -> str:
-    """Displacement and rotation."""
     if response.loaded is None:
         return "no equilibrium with this force"
     rotation = n(np.degrees(np.linalg.norm(response.rotation)), ".2g", "°")
@@ -173,7 +172,6 @@ class PushFeature(Feature):
         return Push(size * along / length, at)
 
     def _type(self, push: Push) -> None:
-        """Write a force into the fields."""
         size = float(np.linalg.norm(push.force))
         self._force.value = size / self._unit.newtons
         if size > 0.0:
@@ -215,7 +213,6 @@ class PushFeature(Feature):
         nodes.mesh("/gives_way", *self._ball, COLOR, BALL_OPACITY, wxyz=wxyz, scale=(x, y, z), **looks)
 
     def _leave(self, client: int) -> None:
-        """Release the force of a client that has disconnected."""
         if self._hold is not None and self._hold[0] == client:
             self.release()
 

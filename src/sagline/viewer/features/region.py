@@ -103,22 +103,18 @@ class RegionFeature(Feature):
 
     @property
     def _without(self) -> str:
-        """Text of the broken cables."""
         return "" if self._query is None else self._query.without
 
     @property
     def _anything(self) -> bool:
-        """True if the user has chosen a drawing."""
         return bool(self._region_box.value or self._slice_box.value or self._travel_box.value)
 
     @property
     def _by_cable(self) -> bool:
-        """True if the hull has the colors of the limiting cables."""
         return bool(self._color.value != BY_MARGIN)
 
     @property
     def _scaled(self) -> bool:
-        """True if a drawing has the colors of margins."""
         return bool(self._slice_box.value or (self._region_box.value and not self._by_cable))
 
     def depends(self, view: View) -> Hashable:
@@ -216,7 +212,6 @@ class RegionFeature(Feature):
             self._hull_html.content = html_block(hull.text)
 
     def _compute(self, *, rough: bool) -> None:
-        """Start the computation of the shown workspace's hull in the background."""
         query, key = self._query, self._key
         assert query is not None
         self._progress = 0.0
@@ -240,7 +235,6 @@ class RegionFeature(Feature):
         )
 
     def _receive(self, result: _Result) -> None:
-        """Draw a result of the background task."""
         if self._region_box.value and self._key is not None:
             self._result = result
             self._follow_hull()
@@ -318,7 +312,6 @@ class RegionFeature(Feature):
             self._nodes.label(f"/travel/{workspace.NAMES[which]}", text, travel.ends[k], scale=_TEXT_SCALE)
 
     def _clear(self) -> None:
-        """Remove the drawing and the stored workspace."""
         self._nodes.remove("/hull", "/wall", "/slice", "/travel")
         self._nodes.hide("/platform/left")
         self._hull_key = self._key = self._slice_key = None
@@ -334,7 +327,6 @@ def _scale_of(levels: Levels, region: Region) -> MarginScale:
 
 
 def _load(field: Any, unit: str) -> float:
-    """The number of a field."""
     value = float(field.value)
     if not 0.0 <= value < 1e12:
         raise InvalidValueError(field.label, value, f"0 {unit} or more", "Type a load, 0 for none.")

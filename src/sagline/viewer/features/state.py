@@ -56,11 +56,7 @@ def _short(value: float, form: str) -> str:
 
 
 class StateFeature(Feature):
-    """Field of the pose, and the state as code or as a link.
-
-    Attributes:
-        controls: All controls of the page.
-    """
+    """Field of the pose, and the state as code or as a link."""
 
     def __init__(self, page: Page) -> None:
         """Build the panel after all other controls, because links contain their values."""
@@ -85,7 +81,6 @@ class StateFeature(Feature):
             self._answer("copy-reply", self._copy, *self._requests.popleft())
 
     def _go(self, text: str, _client: int) -> None:
-        """Go to a pose that was typed."""
         self._page.go_near(pose_of_text(text, "the pose", POSE_STEP))
 
     def _answer(self, topic: str, reply: Callable[[str, int], str | None], value: Any, client: int) -> None:
@@ -103,7 +98,6 @@ class StateFeature(Feature):
         self._channel.send_to(client, topic, {"to": name, **answer})
 
     def _copy(self, kind: str, client: int) -> str:
-        """Code or link of the view."""
         view, source = self._view, self._page.source
         if view is None:
             raise InvalidValueError("the view", "not there yet", "a view that is shown", "Wait until it is shown.")
@@ -117,7 +111,6 @@ class StateFeature(Feature):
         return code_of(view, self._robot, source, self._time)
 
     def _link_to(self, view: View, client: int) -> str:
-        """A link to a view with the camera of a client."""
         parts = {"robot": link.name_of(self._robot)}
         if view.played is not None:
             parts["time"] = repr(float(self._page.player.time))
@@ -190,7 +183,6 @@ def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
 
 
 def _changes(settings: Settings, robot: Robot) -> list[str]:
-    """Lines of Python that change a robot as the settings of the page do."""
     lines = [] if settings.mass == robot.mass else [_weighed(settings.mass)]
     factors = {"linear_density": settings.density, "axial_stiffness": settings.stiffness}
     changed = [f"    {name}=cables.{name} * {factor!r}," for name, factor in factors.items() if factor != 1.0]
@@ -204,7 +196,6 @@ def _weighed(mass: float) -> str:
 
 
 def _planned(snapshot: Snapshot, view: View) -> list[str]:
-    """Lines of Python for the plan of a pose."""
     settings, pose = view.settings, snapshot.pose
     yaw = number_text(given_yaw(pose, settings.given), ".17g")
     made = [f"pose = sl.Pose.from_euler({_plain(pose.position)}, {yaw}, 0, 0)"]

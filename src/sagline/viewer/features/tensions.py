@@ -370,6 +370,5 @@ class TensionsFeature(Feature):
         return away * min(1.0, OVER * float(np.max(field.high - field.low)) / far) if far > 0.0 else away
 
     def _on_method(self, value: Any, _: int) -> None:
-        """Choose the tension distribution method of a clicked mark."""
         if self._field is not None and isinstance(value, str) and value in METHODS:
             self._panel.method.value = value
