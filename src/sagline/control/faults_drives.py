@@ -117,7 +117,7 @@ class _FollowingError(Fault):
         )
 
     def _away(self, cycle: Cycle) -> Array:
-        """Distances (m,) [m] of the lengths from the intervals between the last two set points that the PLCs accepted."""
+        """Distances (m,) [m] of the lengths from the ranges between the last two set points that the PLCs accepted."""
         # drives that are not enabled, and groups whose commands are still in transit, are excluded
         sent = {command.counter: k for k, command in enumerate(self._sent)}
         length = cycle.sample.length

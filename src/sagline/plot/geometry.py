@@ -26,8 +26,8 @@ class FlatLine(NamedTuple):
 
     points: Array  # coordinates to the right, up, and toward the viewer [m], shape (P, 3)
     half_width: float  # half of the width [m] within which the line hides lines behind it; 0 if it hides nothing
-    # Additional distance at crossings [m]: a line is not hidden if it is less than half_width + gap behind this line, as
-    # is a cable that ends at the same anchor.
+    # Additional distance at crossings [m]: a line that is less than half_width + gap behind this line, such as a cable
+    # that ends at the same anchor, is not hidden.
     gap: float
 
 
