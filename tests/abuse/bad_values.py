@@ -440,8 +440,12 @@ def _one(valid: Any) -> Iterator[Bad]:
 
 
 def _place(valid: Any) -> Iterator[Bad]:
-    """A state in place of a pose."""
-    yield from (bad for bad in _one(valid) if not isinstance(bad.value, sl.Pose))
+    """A state in place of a pose or of a position."""
+    for bad in _one(valid):
+        if isinstance(bad.value, tuple):
+            yield bad._replace(verdict=EITHER)
+        elif not isinstance(bad.value, sl.Pose):
+            yield bad
 
 
 def _motion(valid: Any) -> Iterator[Bad]:

@@ -293,8 +293,8 @@ def _robots(given: _Given) -> dict[str, Call]:
         "Robot.with_payload": Call(robot.with_payload, _all(mass=("number", 2.0), at=("array", [0.0, 0.5, 1.0], True))),
         "Robot: plane": Call(flat.replace, _all(plane_normal=("array", [0.0, 0.0, 2.0]))),
         "PoseBox": Call(sl.PoseBox, _all(low=("array", [0.0, 1.0, 2.0]), high=numbers, tilt=("number", 0.25))),
-        "Pose": Call(sl.Pose, _all(position=box, rotation=("array", np.eye(3)))),
-        "Pose: x, y, z": Call(partial(sl.Pose, 1.0, 2.0), _all(z=("number", 3.0, True))),
+        "Pose": Call(sl.Pose, _all(position=box, rotation=("array", np.eye(3), True))),
+        "Pose: x, y, z": Call(partial(sl.Pose, 1.0, 2.0), _all(z=("array", 3.0, True))),
         "Pose.from_euler": Call(sl.Pose.from_euler, _all(position=box, alpha=angle, beta=angle, gamma=angle)),
         "Pose.from_quaternion": Call(
             sl.Pose.from_quaternion, _all(position=box, quaternion=("array", [0.0, 0.0, 0.0, 1.0]))

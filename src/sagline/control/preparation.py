@@ -18,7 +18,7 @@ from sagline.control.set_points import Along
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array
-from sagline.robot.pose import Pose, PoseLike, pose_of
+from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 
 T = TypeVar("T")
@@ -171,7 +171,7 @@ class Preparation:
             check_transition(self.state, State.HOMING, "homing")
         elif active.source is not None:
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stops.")
-        place = pose_of(pose)
+        place = single_pose(pose)
         present = c.zero - c.correction  # the lengths include the correction of the tension loop
         homing = self._result_of(partial(Homing, c.robot, place, c.model, c.method, present))
         c.zero, c.homed = present, False

@@ -15,6 +15,7 @@ from sagline.core.arrays import Array, Flags, Indices
 
 SMOOTH: Final = 0.01  # [rad], largest change of direction that is passed without a stop
 REVERSAL: Final = np.pi - 0.01  # [rad], a larger change of direction is a stop, not an arc
+SHARP: Final = 1e-12  # [m], a corner with a smaller tolerance is not rounded
 STRAIGHT: Final = 1e-4  # [rad], a smaller change of direction between two lines needs no arc
 LEAST: Final = 1e-12  # [m], a shorter move is a rounding error
 EXACT_STOP: Final = -1.0  # tolerance of a move that ends at rest
@@ -146,7 +147,7 @@ def _rounded(chain: Moves) -> tuple[_Joined, Moves]:
     angle = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), cosine)
     moving = (first.length > 0.0) & (second.length > 0.0) & (first.tolerance >= 0.0)
     lines = (first.turning == 0.0) & (second.turning == 0.0)
-    bent = moving & lines & (first.tolerance > 0.0) & (angle > STRAIGHT) & (angle < REVERSAL)
+    bent = moving & lines & (first.tolerance > SHARP) & (angle > STRAIGHT) & (angle < REVERSAL)
     half = np.where(bent, angle, 1.0) / 2.0
     # distance of the corner from the arc: cut tan(angle/4)
     cut = np.minimum(np.minimum(first.tolerance / np.tan(half / 2.0), first.room), second.room)

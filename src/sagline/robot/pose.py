@@ -290,7 +290,7 @@ PoseLike = Pose | Sequence[Pose] | ArrayLike  # an array contains positions [m] 
 
 def pose_of(value: PoseLike, item: str = "pose") -> Pose:
     """Convert a list of poses to a batch, and positions [m], shape (3,) or (N, 3), to poses without rotation."""
-    if not isinstance(value, list | tuple | np.ndarray):
+    if not (isinstance(value, list | tuple) or hasattr(value, "__array__")):
         return instance(value, Pose, item)
     if isinstance(value, list | tuple) and value and all(isinstance(one, Pose) for one in value):
         return Pose._adopt(*(np.vstack([getattr(one, name) for one in value]) for name in Pose.__slots__))

@@ -203,11 +203,12 @@ class Robot(Shown):
             >>> print(f"{loaded.mass:g} kg, center of mass at {loaded.center_of_mass[2]:.3f} m")
             191.058 kg, center of mass at -0.136 m
         """
-        whole = self.mass + number(mass, "mass of the payload", "kg", low=0.0)
+        load = number(mass, "mass of the payload", "kg", low=0.0)
+        whole = self.mass + load
         if at is None:
             return self.replace(mass=whole, inertia=self.inertia * (whole / self.mass))
         lever = exactly(at, "at", "m", (3,)) - self.center_of_mass
-        share = mass / whole
+        share = load / whole
         # parallel axis theorem for two bodies about their common center of mass, with the reduced mass
         added = share * self.mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
         center = self.center_of_mass + share * lever

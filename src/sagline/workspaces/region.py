@@ -60,6 +60,8 @@ class Orientations:
             >>> print(sl.Orientations(turned.matrix, need="any"))
             any of 3 sampled rotations, by up to 20°
         """
+        if rotations is None:
+            raise InvalidValueError("rotations", "None", "at least one rotation", "Give np.eye(3) for level.")
         quaternion = np.atleast_2d(Pose(np.zeros(3), rotations).quaternion)
         if not len(quaternion):
             raise InvalidValueError("rotations", "an empty set", "at least one rotation", "Give np.eye(3) for level.")

@@ -185,8 +185,8 @@ def started_run(
     numbers_each = 19 + given.robot.cable_count * (2 + (3 * elements + 3 if elements else 0))
     check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
-    settings = {"integrator": get_args(Integrator)[rules[0]], "winches": winches, "winding": winding, "damping": losses}
-    settings["anchors"] = given.anchors
+    settings = {"integrator": get_args(Integrator)[rules[0]], "winding": get_args(Winding)[rules[2]]}
+    settings |= {"winches": winches, "damping": losses, "anchors": given.anchors}
     inputs = (_set_points(given, plant, rules[1]), given.wrench, air, given.places)
     return SimulationRun(plant, rules, numbers, inputs, every, count, happening, settings)
 
