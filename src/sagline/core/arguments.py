@@ -9,7 +9,7 @@ import operator
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from reprlib import Repr
 from types import MappingProxyType
@@ -20,8 +20,6 @@ import numpy as np
 from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
-
-_LIST: Final = 200  # longest list of allowed words in a message
 
 # type name: sentence about the creation of an object of this type, the next step of messages about wrong types
 HOW_TO_GET: Final = MappingProxyType(
@@ -113,15 +111,7 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
         return str(value)  # numpy has its own string type
     near = nearest(value, words) if isinstance(value, str) else None
     step = f"Choose one of them as {item}." if near is None else f"Did you mean {near}?"
-    raise InvalidValueError(item, brief(value), _listed(words), step)
-
-
-def _listed(words: Sequence[str]) -> str:
-    """The words as a list; of a list too long for a message the first ones, and the number of the others."""
-    if len(text := ", ".join(words)) <= _LIST:
-        return text
-    count = text[:_LIST].count(", ")
-    return f"{', '.join(words[:count])} and {len(words) - count} more"
+    raise InvalidValueError(item, brief(value), ", ".join(words), step)
 
 
 def word_of(name: str) -> str:

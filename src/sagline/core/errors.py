@@ -43,8 +43,9 @@ class InvalidValueError(SaglineError, ValueError):
 
     def __str__(self) -> str:
         """Message in one line: item, value, allowed range, next step."""
-        parts = (str(self.item), str(self.value), str(self.allowed), str(self.next_step))
-        item, value, allowed, next_step = shortened(parts, room=MOST - len(" is ; allowed: . "))
+        others, room = [str(part) for part in (self.item, self.value, self.next_step)], MOST - len(" is ; allowed: . ")
+        allowed = _first_words(str(self.allowed), room - sum(map(len, others)))
+        item, value, next_step, allowed = shortened((*others, allowed), room)
         return f"{item} is {value}; allowed: {allowed}. {next_step}"
 
 
@@ -151,6 +152,15 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     folded = {other.lower(): other for other in known}
     near = get_close_matches(word[:_WORD].lower(), folded, n=1)
     return folded[near[0]] if near else None
+
+
+def _first_words(text: str, room: int) -> str:
+    """A list of words in at most `room` characters: the first words and the number of the others."""
+    count = text[: max(0, room - len(" and 999 more"))].count(", ")
+    if len(text) <= room or count == 0:
+        return text
+    words = text.split(", ")
+    return f"{', '.join(words[:count])} and {len(words) - count} more"
 
 
 def shortened(parts: Sequence[str], room: int) -> list[str]:
