@@ -57,6 +57,28 @@ def test_headings_and_tables_stand_between_blank_lines(file: Path) -> None:
     assert [line for line, *pair in zip(lines[1:], kinds, kinds[1:], strict=False) if "".join(pair) in meetings] == []
 
 
+def headings(file: Path) -> set[str]:
+    """Addresses of the headings of a page, as the site forms them."""
+    titles = re.findall(r"^#+ (.+)$", outside_code(file.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", title).strip().lower()) for title in titles}
+
+
+def test_links_between_pages_lead_to_files_and_headings() -> None:
+    docs, dead, anchors = ROOT / "docs", [], 0
+    made = {docs / name for name in (*reference_pages(), *OF_COMMANDS)}
+    for file in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(docs.rglob("*.md"))):
+        for link in re.findall(r"\]\((?!\w+:)([^)\s]+)\)", outside_code(file.read_text(encoding="utf-8"))):
+            path, _, heading = link.partition("#")
+            target = (file.parent / path).resolve() if path else file
+            if target in made or docs / "gallery" in target.parents:
+                continue
+            anchors += bool(heading)
+            if not target.exists() or (heading and heading not in headings(target)):
+                dead.append(f"{file.name}: {link}")
+    assert dead == []
+    assert anchors > 20
+
+
 def measured(span: "float", *, rise: "float | None" = None) -> "Cable":  # type: ignore[name-defined]  # noqa: F821
     """Length of a cable.
 
