@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from sagline.calibration.log import count_of_frequencies
@@ -21,14 +24,6 @@ from sagline.plot.labels import figure_legend, set_heading, spread_heights, writ
 from sagline.plot.sheet import COLORS, GAP_COLOR, MAP_COLORS, VERMILLION, color_bar, draw_map, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
-
-    from sagline.core.arrays import Array
 
 PARTS: Final = ("all", "residuals", "correlation", "errors")
 BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # for each band, its half width in standard deviations and its opacity

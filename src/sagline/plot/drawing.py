@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from sagline.core.arguments import instance
-from sagline.core.arrays import number
+from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
 from sagline.plot.geometry import FlatLine, view_axes, visible_parts
 from sagline.plot.labels import write_beside
 from sagline.plot.robot import FACES, Stroke, drawn_pose, ground, platform_box, strokes, tension_bar
 from sagline.plot.sheet import Sheet, axes_or_new
-from sagline.plot.style import current
+from sagline.plot.style import Style, current
 from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
 from sagline.viewer.shapes import round_below
 from sagline.viewer.tension_scale import TensionScale
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from sagline.core.arrays import Array
-    from sagline.kinematics.plan import Plan
-    from sagline.plot.style import Style
 
 AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
 USUAL: Final = view_axes(float(AZIMUTH), float(ELEVATION))

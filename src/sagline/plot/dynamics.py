@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise, zip_longest
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize, to_rgb
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from numpy.typing import ArrayLike
 
 from sagline.core.arguments import choice, instance, listed, text
-from sagline.core.arrays import checked
+from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.response import FrequencyResponse, ResponseCurves
@@ -22,13 +25,6 @@ from sagline.dynamics.vibration.vibration import Vibration
 from sagline.plot import sheet
 from sagline.plot.labels import legend_above, name_lines, set_heading
 from sagline.plot.style import current
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
-
-    from sagline.core.arrays import Array
 
 THIN, WIDE = 0.6, 3.6  # line width if only the cables move, and if only the platform moves [pt]
 FAINT = 0.4  # opacity of thin lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -13,15 +13,13 @@ from PIL import Image
 
 from sagline.core.arguments import callback, file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.progress import Progress
 from sagline.dynamics.vibration.vibration import WITH_MASS, ListedMode, Vibration, listed_modes
 from sagline.files.writing import atomic_file
 from sagline.plot.robot import fit_space, platform_box
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
 from sagline.viewer.shapes import BOX_EDGES
 from sagline.viewer.swing import PERIOD, Swing
-
-if TYPE_CHECKING:
-    from sagline.core.progress import Progress
 
 SECONDS = 10.0  # duration of the animation [s]; the animation has whole periods, so that it repeats without a jump
 PICTURES = 25  # pictures per period

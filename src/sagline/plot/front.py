@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sagline.core.arguments import instance
+from sagline.core.arrays import Array
 from sagline.optimization.front import Front
+from sagline.optimization.request import Goal
 from sagline.plot.labels import name_lines, set_heading
 from sagline.plot.sheet import BLUE, GAP_COLOR, VERMILLION, format_axes, sheet
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from sagline.core.arrays import Array
-    from sagline.optimization.request import Goal
 
 EACH = 3.2  # height of a panel [in]
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from math import ceil
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sagline.core.arguments import HOW_TO_GET, choice, instance
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.indices import evenly_spaced, true_runs
 from sagline.core.numbers import n
@@ -17,12 +19,6 @@ from sagline.motion.path import Path
 from sagline.plot import sheet
 from sagline.plot.labels import LENGTHS, PLACE, TENSIONS, TIME, figure_legend, name_lines
 from sagline.plot.style import current
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from sagline.core.arrays import Array
 
 OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"

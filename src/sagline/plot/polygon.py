@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
+from numpy.typing import ArrayLike
 
 from sagline.core.arguments import instance
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.plot.labels import name_lines, write_beside
 from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 from sagline.tension.polygon import TensionPolygon
 from sagline.viewer.shapes import grouped
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
-
-    from sagline.core.arrays import Array
 
 MARKERS = "osD^v<>phXP*"
 LARGEST, LEAST = 11.0, 4.0  # sizes of the first and of the last mark at a place [pt]

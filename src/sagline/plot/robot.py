@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import patheffects
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.ticker import MaxNLocator
@@ -14,9 +15,11 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from scipy.spatial import ConvexHull
 
 from sagline.core.arguments import instance, optional
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import VERMILLION, color_bar, sheet
 from sagline.plot.style import current
@@ -25,12 +28,6 @@ from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import TensionScale
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from sagline.core.arrays import Array
-    from sagline.kinematics.plan import Plan
 
 POINTS = 50  # points around each pulley
 FLAT = 1e-6  # the shadow of a platform that is thinner than this share of the robot's size is a line

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sagline.control.execution import Execution, null_space_error, position_error
 from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
+from sagline.core.arrays import Array
 from sagline.core.indices import true_runs
 from sagline.core.numbers import ROUNDING, n, prefixed_unit
 from sagline.dynamics.simulation.results import Simulation
 from sagline.plot import sheet
 from sagline.plot.labels import figure_legend, legend_above, name_lines, wrap_heading, write_beside
 from sagline.plot.style import current
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from sagline.core.arrays import Array
 
 PER_METER: Final = 1e3  # [mm]
 SHOWN: Final = 0.5  # the tension limit is drawn if the largest tension exceeds this share of the limit

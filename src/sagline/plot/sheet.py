@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import re
 from base64 import b64encode
+from collections.abc import Iterable
 from io import BytesIO
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from typing import Any, Final, Literal, cast
 from xml.etree import ElementTree
 
 import matplotlib
@@ -15,25 +16,20 @@ import numpy as np
 from fontTools import subset
 from fontTools.ttLib import TTFont
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PathCollection
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, fontManager
 from matplotlib.ticker import MaxNLocator
 
 from sagline.core.arguments import brief, file_path, optional
+from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import atomic_file
 from sagline.plot.labels import PLACE, TIME
 from sagline.plot.style import PLAIN, SANS, SERIF, Using, current
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colorbar import Colorbar
-    from matplotlib.colors import Normalize
-
-    from sagline.core.arrays import Array
 
 # Okabe and Ito 2008, "Color universal design"; two colors that are too pale for lines on white are left out
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import floor, log10
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib import patheffects
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb, to_rgba
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import BboxBase
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
 from scipy.ndimage import distance_transform_edt, label, minimum_filter
 
 from sagline.core.arguments import choice, instance
-from sagline.core.arrays import number
+from sagline.core.arrays import Array, Flags, Indices, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
@@ -28,17 +34,6 @@ from sagline.viewer.tension_scale import CABLES, cable_color
 from sagline.workspaces.levels import Plane, Slice, slice_of
 from sagline.workspaces.region import AXES, flat_axis
 from sagline.workspaces.workspace import BY_BOX, Workspace, amount_of, orientations_text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.text import Text
-    from matplotlib.transforms import BboxBase
-    from mpl_toolkits.mplot3d.axes3d import Axes3D
-
-    from sagline.core.arrays import Array, Flags, Indices
 
 POINTS: Final = 200  # number of grid points along the longer side
 LINES: Final = 5  # approximate number of contour lines of the margin

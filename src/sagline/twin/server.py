@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sagline.control.real_time import Pace
 from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.dynamics.simulation.simulator import Reading
 from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, winch_row, winch_rows
 from sagline.plc.wire import LAST_PORT, plc_packages
 from sagline.robot.pose import Pose
@@ -24,9 +25,6 @@ from sagline.robot.robot import Robot
 from sagline.twin.block_servers import LOOPBACK, BlockServers
 from sagline.twin.link import Report
 from sagline.twin.machine import Machine
-
-if TYPE_CHECKING:
-    from sagline.dynamics.simulation.simulator import Reading
 
 SCAN: Final = 0.005  # scan period of a twin's PLCs [s]; with half a control cycle, each cycle reads a new block
 SILENT: Final = bytes(FROM_PLC.size)
