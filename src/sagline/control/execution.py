@@ -251,8 +251,7 @@ def null_space_error(execution: Execution, filter_time: float | None = None) -> 
         docs/model.md, section 12.
     """
     done = instance(execution, Execution, "execution")
-    default = TensionSettings().filter_time
-    time = default if filter_time is None else number(filter_time, "filter_time", "s", low=0.0)
+    time = TensionSettings().filter_time if filter_time is None else number(filter_time, "filter_time", "s", low=0.0)
     plan, error = done.plan, np.full(done.tension.shape, np.nan)
     gains = None if plan is None else gains_along(plan)
     if plan is None or gains is None:

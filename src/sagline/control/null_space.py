@@ -60,8 +60,7 @@ def _balance_slope(state: Equilibrium) -> Array:
     """Derivatives of the wrench with respect to frame-end tensions if the platform is fixed, (..., n, m) [1, m]."""
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / slopes.tension_by_length[..., None, :]
-    found: Array = -first_of(state.robot).freedom @ wrench  # minus: these forces act on the cable
-    return found
+    return np.asarray(-first_of(state.robot).freedom @ wrench)  # minus: these forces act on the cable
 
 
 @of_equilibrium

@@ -49,7 +49,7 @@ class Block:
 
     @cached_property
     def rows(self) -> tuple[tuple[str, str, int], ...]:
-        """Name, type and offset of every plain value. The names of the values of a winch come from `winch_row`."""
+        """Name, type and offset of every plain value. The names of the values of a winch come from `_winch_row`."""
         rows: list[tuple[str, str, int]] = []
         for name, kind, offset, _ in self.fields:
             if isinstance(kind, str):
@@ -57,7 +57,7 @@ class Block:
                 continue
             size = sum(_bytes(f.type) for f in kind)
             for i in range(GROUP_SIZE):
-                rows += [(winch_row(i, f.name), str(f.type), offset + i * size + f.offset) for f in kind]
+                rows += [(_winch_row(i, f.name), str(f.type), offset + i * size + f.offset) for f in kind]
         return tuple(rows)
 
     @cached_property
@@ -74,9 +74,11 @@ class Block:
             at = offset + _bytes(kind)
         return struct.Struct(text + "x" * (self.size - at))
 
-    def pack(self, values: Mapping[str, Any]) -> bytes:
-        """Pack values into the bytes of the block."""
+    def pack(self, values: Mapping[str, Any], winches: Mapping[str, Sequence[Any]] | None = None) -> bytes:
+        """Pack values into the bytes of the block. `winches`: values of the winches of a group, by name."""
         known = {"magic": self.magic, "version": LAYOUT, AGAIN: values.get("counter", 0), **values}
+        for name, column in (winches or {}).items():
+            known |= {_winch_row(i, name): value for i, value in enumerate(column)}
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
@@ -96,7 +98,12 @@ class Block:
         return values
 
 
-def winch_row(index: int, name: str) -> str:
+def of_winches(values: Mapping[str, Any], name: str) -> list[Any]:
+    """One value of each winch of a group, by its name, from the values that `Block.read` returns."""
+    return [values[_winch_row(i, name)] for i in range(GROUP_SIZE)]
+
+
+def _winch_row(index: int, name: str) -> str:
     """Name of a value of a winch in SCL."""
     return f"winch[{index + 1}].{name}"
 
@@ -197,10 +204,9 @@ def command_blocks(command: Command) -> list[bytes]:
         "owner": command.owner,
         "valid_for": round(1000.0 * command.valid_for),
     }
-    names = ("length", "rate", "tension", "enable")
-    columns = [getattr(command, name).tolist() for name in names]
+    columns = {name: getattr(command, name).tolist() for name in ("length", "rate", "tension", "enable")}
     return [
-        TO_PLC.pack(head | winch_rows(names, [column[group[0] : group[-1] + 1] for column in columns]))
+        TO_PLC.pack(head, {name: column[group[0] : group[-1] + 1] for name, column in columns.items()})
         for group in groups_of(len(command.length))
     ]
 
@@ -218,15 +224,7 @@ def sample_of(
     heads = ("counter", "owner", "echo", "status", "fault")
     columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
     for name in OF_WINCHES:
-        rows = [winch_row(i, name.removeprefix("winch_")) for i in range(GROUP_SIZE)]
-        values = [group[row] for group in groups for row in rows][:winches]
+        values = [value for group in groups for value in of_winches(group, name.removeprefix("winch_"))][:winches]
         columns[name] = np.array(values, dtype=np.float64 if name in REALS else np.int64)
     plc_time = np.array([1e-6 * group["time"] for group in groups])
     return Sample(time=time, age=age, plc_time=plc_time, discarded=discarded, reasons=reasons, **columns)
-
-
-def winch_rows(names: Sequence[str], columns: Sequence[Sequence[Any]]) -> dict[str, Any]:
-    """Values of the winches of a group, by the name of the row."""
-    return {
-        winch_row(i, name): value for name, column in zip(names, columns, strict=True) for i, value in enumerate(column)
-    }

@@ -205,8 +205,8 @@ def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["l
 def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
     """Limit `ax` to a box with sides of at least a tenth of the longest side. Returns the lengths of the sides."""
     size: Array = np.maximum(high - low, 0.1 * np.max(high - low))
-    middle = 0.5 * (low + high)
-    ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
+    sides = zip("xyz", 0.5 * (low + high), size, strict=True)
+    ax.set(**{f"{name}lim": (middle - 0.5 * side, middle + 0.5 * side) for name, middle, side in sides})
     return size
 
 

@@ -191,8 +191,7 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
     ax.grid(visible=False)
     ax.spines["left"].set_visible(False)
     handles, labels = ax.get_legend_handles_labels()
-    place = legend_above(ax, labels)
-    ax.legend(handles, labels, **{**place, "handlelength": 1.0, "columnspacing": 1.0})
+    ax.legend(handles, labels, **legend_above(ax, labels) | {"handlelength": 1.0, "columnspacing": 1.0})
     return ax
 
 

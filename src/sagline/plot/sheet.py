@@ -282,8 +282,7 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
 
 def _with_fonts(svg: str) -> str:
     """Embed the fonts of a drawing. Each font contains only the letters that the drawing uses."""
-    letters = _letters(svg)
-    faces = [_face(face, "".join(sorted(used))) for face, used in sorted(letters.items()) if used]
+    faces = [_face(face, "".join(sorted(used))) for face, used in sorted(_letters(svg).items()) if used]
     if not faces:
         return svg
     head, opening, rest = re.split(r"(<svg\b[^>]*>)", svg, maxsplit=1)

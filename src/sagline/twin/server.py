@@ -18,7 +18,7 @@ from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.dynamics.simulation.simulator import Reading
-from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, winch_row, winch_rows
+from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, of_winches
 from sagline.plc.wire import LAST_PORT, plc_packages
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -114,10 +114,8 @@ class Server:
         values = TO_PLC.read(data)
         if isinstance(values, Refusal):
             return None
-        winches = range(len(self.machine.groups[group]))
-        length, rate, tension, enable = (
-            np.array([values[winch_row(i, name)] for i in winches]) for name in ("length", "rate", "tension", "enable")
-        )
+        count, names = len(self.machine.groups[group]), ("length", "rate", "tension", "enable")
+        length, rate, tension, enable = (np.array(of_winches(values, name)[:count]) for name in names)
         mode = Mode(values["mode"]) if values["mode"] in MODES else Mode.HOLD
         head = values["counter"], values["owner"], mode, 1e-3 * values["valid_for"]
         return Command(*head, length, rate, tension, enable != 0)
@@ -144,7 +142,7 @@ def _block_of(group: int, report: Report) -> bytes:
         head["magic"] = 0
     counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # counters overflow as in a PLC
     columns: list[list[Any]] = [*report[8:13], counts, report.state, report.winch_fault]
-    return FROM_PLC.pack(report._asdict() | head | winch_rows(ROWS, columns))
+    return FROM_PLC.pack(report._asdict() | head, dict(zip(ROWS, columns, strict=True)))
 
 
 def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> BlockServers:

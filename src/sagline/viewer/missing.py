@@ -83,8 +83,7 @@ def _step(plan: Plan) -> Array:
     low = robot.tension_min
     high = np.maximum(robot.tension_max, low * (1.0 + 1e-9) + 1e-9)  # the solver requires low < high
     found = lsq_linear(unit[:, None] * matrix, unit * (freedom @ needed), (low, high), tol=1e-12)
-    rest: Array = freedom.T @ (freedom @ needed - matrix @ found.x)
-    return rest
+    return np.asarray(freedom.T @ (freedom @ needed - matrix @ found.x))
 
 
 def _limits(plan: Plan, held: Plan) -> dict[int, bool]:

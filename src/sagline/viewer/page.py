@@ -100,8 +100,7 @@ class Page:
         server.on_client_disconnect(self.channel.disconnect)
         home = home_pose(robot) if played is None else played.at(0.0).pose
         self.home = home if pose is None else pose  # initial pose of the platform
-        forget = partial(self.later, self._forget)
-        self.panel = ControlPanel(server, robot, self.scale, self.refresh, forget, given)
+        self.panel = ControlPanel(server, robot, self.scale, self.refresh, partial(self.later, self._forget), given)
         self.scene = RobotScene(server.scene, robot, self.home)
         self.extent = self.scene.extent(self.home)  # lowest and highest corner of everything that is drawn [m]
         self.framing = Framing(server, *self.extent)

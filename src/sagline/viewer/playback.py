@@ -15,13 +15,14 @@ from sagline.core.progress import Progress
 from sagline.dynamics.simulation.results import Occurrence, Simulation
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
 from sagline.motion.anchors import refuse_moving
 from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
-from sagline.viewer.timeline import Chart, Track, infeasible_spans, limit_violations, tension_chart
+from sagline.viewer.tension_scale import ForceUnit, cables_text, force_unit, number_text
+from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of, tension_chart
 
 CABLES: Final = {
     "none": "massless cables",
@@ -76,13 +77,35 @@ class PlayedPlan(Played):
         tension = tension_chart(name, self.robot, plan.state.limited_tension, limited)
         length = Chart("Unstrained length", "m", 4, tension.names, lambda rows: plan.unstrained_length[rows])
         paths = (("desired", WANTED), ("actual", ACTUAL))
-        return Track(self.time, (tension, length), infeasible_spans(plan, self.time), (), paths)
+        return Track(self.time, (tension, length), _infeasible_spans(plan, self.time), (), paths)
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= `most`, with a scaled error; NaN in gaps."""
         rows = evenly_spaced(len(self.time), most)
         wanted = self.plan.state.pose.position[rows]
         return wanted, wanted + error_scale * self.confirmation.position_error[rows]
+
+
+def _infeasible_spans(plan: Plan, time: Array) -> tuple[Span, ...]:
+    """Time spans in which a plan of N poses is not feasible or not stable."""
+    unit = force_unit(plan.state.one_robot)
+
+    def why(rows: slice) -> str:
+        lost = plan.status[rows] == PoseStatus.INFEASIBLE
+        if not lost.any():  # poses before and after infeasible ones are often unstable
+            status = PoseStatus(int(plan.status[rows][~plan.solved[rows]][0]))
+            return status.name.replace("_", " ").lower()
+        short = plan.shortfall[rows][lost]
+        known = short[np.isfinite(short)]
+        parts = ["not feasible"]
+        if np.isinf(short).any():
+            parts.append("no force alone is sufficient")
+        elif known.size:
+            parts.append(f"short of up to {unit.written(float(known.max()))}")
+        blocking = np.flatnonzero(plan.blocking[rows][lost].any(axis=0))
+        return ": ".join(parts) + (f"; at their limits: {cables_text(blocking)}" if blocking.size else "")
+
+    return spans_of(time, ~plan.solved, why)
 
 
 def _sample(plan: Plan, i: int) -> Plan:
@@ -148,8 +171,7 @@ class PlayedSimulation(Played):
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired positions, all NaN, and actual positions, both of shape (n, 3) with n <= `most`."""
-        rows = evenly_spaced(len(self.time), most)
-        actual = self.simulation.pose.position[rows]
+        actual = self.simulation.pose.position[evenly_spaced(len(self.time), most)]
         return np.full_like(actual, np.nan), actual
 
     def track(self) -> Track:

@@ -79,11 +79,7 @@ def numbers_html(
 
 def legend(scale: TensionScale, robot: Robot, ends: str = "") -> str:
     """Colors of the tensions, as a bar with round numbers below. `ends` names the bar's ends, by default the limits."""
-    stops = np.linspace(0.0, 1.0, 12)
-    values = scale.low * (scale.high / scale.low) ** stops
-    colors = ",".join(
-        f"{css_color(color)} {100 * stop:.0f}%" for stop, color in zip(stops, scale.colors(values), strict=True)
-    )
+    colors = ",".join(f"{css_color(color)} {100 * k / 11:.0f}%" for k, color in enumerate(scale.bar(12)))
     unit = force_unit(robot)
     marks = "".join(
         f'<span style="position:absolute;left:{100 * place:.1f}%;transform:translateX(-{100 * place:.0f}%)">'
@@ -135,13 +131,16 @@ def color_key(entries: Iterable[tuple[Array | Color, str]]) -> str:
     return "".join(f'<span class="key">{swatch(color)}{text}</span>' for color, text in entries)
 
 
+def table_html(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """HTML of a table with a row of heads."""
+    lines = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table><tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>{lines}</table>"
+
+
 def cable_table_html(heads: Iterable[str], columns: Sequence[Sequence[str]], colors: Array | Colors) -> str:
     """HTML of a table with one row per cable: its number with its color, and its text in each column."""
-    rows = "".join(
-        f"<tr><td>{swatch(colors[i])}{i}</td>{''.join(f'<td>{text}</td>' for text in texts)}</tr>"
-        for i, texts in enumerate(zip(*columns, strict=True))
-    )
-    return f"<table><tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>{rows}</table>"
+    texts = enumerate(zip(*columns, strict=True))
+    return table_html(heads, ((f"{swatch(colors[i])}{i}", *row) for i, row in texts))
 
 
 def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:

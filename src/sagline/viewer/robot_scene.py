@@ -134,7 +134,9 @@ class RobotScene:
         self._winches = shapes.winch_solid(robot)
         self._build_surroundings(robot)
         body = self._body = shapes.platform_solid(robot)
-        self._gizmo: Any = self._build_gizmo(robot, body) if live else scene.add_frame("/platform", show_axes=False)
+        # transform controls of the platform, which are only a frame in a scene for pictures
+        frame: Any = None if live else scene.add_frame("/platform", show_axes=False)
+        self.gizmo: viser.TransformControlsHandle = self._build_gizmo(robot, body) if live else frame
         self._platform = self._nodes.mesh("/platform/body", *body, PLATFORM)
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
@@ -143,12 +145,6 @@ class RobotScene:
         )
         self.place(home)
 
-    @property
-    def gizmo(self) -> viser.TransformControlsHandle:
-        """The transform controls of the platform."""
-        gizmo: viser.TransformControlsHandle = self._gizmo
-        return gizmo
-
     def extent(self, pose: Pose) -> tuple[Array, Array]:
         """Lowest and highest corner of the whole drawing with the platform at a pose, with names and axes [m]."""
         corners = np.vstack((self._low, self._high, pose.transform(self._body.vertices), self._winches.vertices))
@@ -156,8 +152,8 @@ class RobotScene:
 
     def dragged_pose(self) -> Pose:
         """Pose of the gizmo."""
-        position = np.asarray(self._gizmo.position, dtype=np.float64).reshape(-1)
-        wxyz = np.asarray(self._gizmo.wxyz, dtype=np.float64).reshape(-1)
+        position = np.asarray(self.gizmo.position, dtype=np.float64).reshape(-1)
+        wxyz = np.asarray(self.gizmo.wxyz, dtype=np.float64).reshape(-1)
         length = float(np.linalg.norm(wxyz)) if wxyz.size == 4 else 0.0
         if position.size != 3 or not 0.5 < length < 2.0:
             position = np.full(3, np.nan)
@@ -174,12 +170,12 @@ class RobotScene:
 
     def place(self, pose: Pose) -> None:
         """Move the platform and its gizmo to a pose."""
-        self._gizmo.position = pose.position
-        self._gizmo.wxyz = np.roll(pose.quaternion, 1)
+        self.gizmo.position = pose.position
+        self.gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def turn(self, pose: Pose) -> None:
         """Give the platform and its gizmo the rotation of a pose."""
-        self._gizmo.wxyz = np.roll(pose.quaternion, 1)
+        self.gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def show(
         self, snapshot: Configuration, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool

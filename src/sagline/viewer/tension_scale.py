@@ -76,8 +76,8 @@ class TensionScale:
 
     def fraction(self, tension: Array) -> Array:
         """Positions of tensions on the scale, 0 to 1, clipped at its ends."""
-        inside = np.clip(tension, self.low, self.high)
-        return np.asarray((np.log(inside) - log(self.low)) / (log(self.high) - log(self.low)))
+        low, high = log(self.low), log(self.high)
+        return np.asarray((np.log(np.clip(tension, self.low, self.high)) - low) / (high - low))
 
     def colors(self, tension: Array) -> Colors:
         """Color of each tension, shape (..., 3); gray for NaN."""
@@ -85,6 +85,10 @@ class TensionScale:
         place = self.fraction(np.where(known, tension, self.low)) * (len(_STEPS) - 1)
         mixed = np.stack([np.interp(place, np.arange(len(_STEPS)), part) for part in _STEPS.T], axis=-1)
         return np.where(known[..., None], np.rint(mixed).astype(np.uint8), GRAY)
+
+    def bar(self, count: int) -> Colors:
+        """Colors of equal steps along the scale, shape (count, 3)."""
+        return self.colors(self.low * (self.high / self.low) ** np.linspace(0.0, 1.0, count))
 
     def linear_colors(self, tension: Array) -> Colors:
         """The same colors without the sRGB curve, which viser's client applies to the colors of line ends."""

@@ -11,8 +11,6 @@ import numpy as np
 
 from sagline.core.arrays import Array, Flags
 from sagline.core.indices import true_runs
-from sagline.kinematics.plan import Plan
-from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.viewer.tension_scale import cables_text, force_unit
 
@@ -96,28 +94,6 @@ def spans_of(time: Array, wrong: Flags, why: Callable[[slice], str]) -> tuple[Sp
         (float(time[a]), float(time[min(b, time.size - 1)]), why(slice(int(a), int(b))))
         for a, b in zip(first, end, strict=True)
     )
-
-
-def infeasible_spans(plan: Plan, time: Array) -> tuple[Span, ...]:
-    """Time spans in which a plan of N poses is not feasible or not stable."""
-    unit = force_unit(plan.state.one_robot)
-
-    def why(rows: slice) -> str:
-        lost = plan.status[rows] == PoseStatus.INFEASIBLE
-        if not lost.any():  # poses before and after infeasible ones are often unstable
-            status = PoseStatus(int(plan.status[rows][~plan.solved[rows]][0]))
-            return status.name.replace("_", " ").lower()
-        short = plan.shortfall[rows][lost]
-        known = short[np.isfinite(short)]
-        parts = ["not feasible"]
-        if np.isinf(short).any():
-            parts.append("no force alone is sufficient")
-        elif known.size:
-            parts.append(f"short of up to {unit.written(float(known.max()))}")
-        blocking = np.flatnonzero(plan.blocking[rows][lost].any(axis=0))
-        return ": ".join(parts) + (f"; at their limits: {cables_text(blocking)}" if blocking.size else "")
-
-    return spans_of(time, ~plan.solved, why)
 
 
 def limit_violations(robot: Robot, time: Array, tension: Array) -> tuple[Span, ...]:

@@ -17,7 +17,7 @@ from sagline.core.numbers import counted, n
 from sagline.kinematics.inverse_rows import Given
 from sagline.robot.robot import Robot, without_cables
 from sagline.tension.methods import MinimumNorm
-from sagline.viewer.readout import color_key, html_block
+from sagline.viewer.readout import color_key, html_block, table_html
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import ForceUnit, cable_color
@@ -94,9 +94,8 @@ class WorkspaceQuery(NamedTuple):
         """Levels, whose change of sign is the boundary."""
         robot = without_cables(self.robot, *self.broken) if self.broken else self.robot
         margin, way = (LeastMargin(),), MinimumNorm()
-        held = None if self.broken else self.given
         about = self.wrenches, self.orientations, margin, self.model, way, None
-        levels = _NumberedLevels(robot, *about, given=held)
+        levels = _NumberedLevels(robot, *about, given=None if self.broken else self.given)
         levels.numbers = np.append(np.delete(np.arange(self.robot.cable_count), self.broken), -1)
         return levels
 
@@ -330,12 +329,11 @@ def travel_text(found: _FreeTravel, unit: ForceUnit, without: str = "") -> str:
         head += f", cable {found.cable[nearest]} limits" if found.cable[nearest] >= 0 else ""
     else:
         head += "No boundary along any axis within the robot's box."
-    rows = "".join(
-        f"<tr><td>{NAMES[which]}</td><td>{distance:.3f} m</td>"
-        f"<td>{_end(bool(crossed), int(cable), found.inside)}</td></tr>"
+    rows = (
+        (NAMES[which], f"{distance:.3f} m", _end(bool(crossed), int(cable), found.inside))
         for which, distance, crossed, cable in zip(found.which, found.distance, found.crossed, found.cable, strict=True)
     )
-    return html_block(f"{head}<table><tr><th>direction</th><th>length</th><th>ends at</th></tr>{rows}</table>")
+    return html_block(head + table_html(("direction", "length", "ends at"), rows))
 
 
 def _end(crossed: bool, cable: int, inside: bool) -> str:

@@ -19,7 +19,7 @@ from sagline.core.numbers import counted, n
 from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import color_key, html_block, refused, sentence, verdict_box
+from sagline.viewer.readout import color_key, html_block, refused, sentence, table_html, verdict_box
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
 from sagline.viewer.server import chosen_by, toggle, typed
 from sagline.viewer.shapes import ball, error_ellipsoids, placed_balls, readable
@@ -67,17 +67,15 @@ def verdict_text(found: Calibration) -> str:
 
 def parameters_text(found: Calibration) -> str:
     """HTML of each kind of parameter: change, standard error and prior deviation, as root mean squares."""
-    parameters, rows = found.parameters, ""
+    parameters, rows = found.parameters, []
     for name, unit in dict.fromkeys(zip(parameters.names, parameters.units, strict=True)):
         mine = (np.array(parameters.names) == name) & (np.array(parameters.units) == unit)
         moved, error = found.values[mine] - parameters.prior[mine], found.standard_error[mine]
         cells = (n(_root_mean_square(each), ".2g", unit) for each in (moved, error, parameters.prior_deviation[mine]))
-        title = name.replace("_", " ")
-        rows += f"<tr><td>{title}</td>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
-    head = "<tr><th></th><th>change</th><th>error</th><th>error before</th></tr>"
+        rows.append((name.replace("_", " "), *cells))
     items = "".join(f"<li>{_direction_text(one)}</li>" for one in (*found.gauge, *found.cannot_tell_apart))
     remark = f"<b>Not observed, or weakly identifiable</b><ul>{items}</ul>" if items else ""
-    return html_block(f"<table>{head}{rows}</table>{remark}")
+    return html_block(table_html(("", "change", "error", "error before"), rows) + remark)
 
 
 def _outliers_text(found: Calibration, chosen: int | None) -> str:
@@ -114,8 +112,8 @@ def pose_residuals(found: Calibration, number: int) -> str:
     )
     measured = f"<table><tr><th>position</th><th>residual</th><th></th></tr>{places}</table>" if places else ""
     weight = f", counts {n(found.weights[number], '.2g')}" if found.weights[number] < 1.0 else ""
-    freedom = degrees_of_freedom(found)[number]
-    fit = f"chi squared {n(found.chi_squared_of_pose[number], '.3g')}, expected {freedom}{weight}"
+    expected = degrees_of_freedom(found)[number]
+    fit = f"chi squared {n(found.chi_squared_of_pose[number], '.3g')}, expected {expected}{weight}"
     return html_block(f"<b>Row {found.rows[number]}</b>: {fit}{cables}{measured}")
 
 

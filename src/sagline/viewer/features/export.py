@@ -38,12 +38,10 @@ def _strip_of(view: View, *remarks: str) -> dict[str, Any]:
     unit = force_unit(view.snapshot.robot)
     drawn = [(settings.sag_scale, "sag"), (settings.error_scale, "errors")]
     larger = [f"{what} drawn {factor:g} times as large" for factor, what in drawn if factor != 1.0]
-    shares = np.linspace(0.0, 1.0, _STOPS)
-    colors = scale.colors(scale.low * (scale.high / scale.low) ** shares)
     return {
         "title": view.snapshot.robot.name,
         "remark": ", ".join((*remarks, *larger)),
-        "colors": [css_color(color) for color in colors],
+        "colors": [css_color(color) for color in scale.bar(_STOPS)],
         "ticks": [[f"{tick / unit.newtons:g}", place] for tick, place in spaced_ticks(scale)],
         "legend": f"Chord tension [{unit.name}]",
     }
@@ -81,8 +79,8 @@ def _camera_of(client: viser.ClientHandle) -> Camera:
     """Camera of a client; an unknown or extreme camera is refused."""
     camera = Camera.of(client.camera)
     if camera is None or not np.all((camera.reach > 0.01) & (camera.reach < 100.0)):
-        step = "Reload the page."
-        raise InvalidValueError("camera", "not known", "a position, a direction and a field of view", step)
+        allowed = "a position, a direction and a field of view"
+        raise InvalidValueError("camera", "not known", allowed, "Reload the page.")
     return camera
 
 
@@ -197,8 +195,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
                 tube = shapes.tube(known, _CABLE_RADIUS * shapes.size_of(robot))
                 _add(scene, f"cable {i}", tube, tuple(colors[i]))
     scene.apply_transform(_Z_UP_TO_Y_UP)
-    glb: bytes = scene.export(file_type="glb")
-    return glb
+    return bytes(scene.export(file_type="glb"))
 
 
 def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], place: Any = None) -> None:

@@ -160,8 +160,7 @@ class MissingFeature(Feature):
         """Write the explanation, and draw the nearest feasible pose; until it is computed, draw the previous one."""
         assert self._shown is not None
         (snapshot, view), nearest = self._shown, self._nearest
-        searching = self._nearest_key != self._key
-        self._panel.explain(explanation(snapshot, view.missing, nearest, searching=searching))
+        self._panel.explain(explanation(snapshot, view.missing, nearest, searching=self._nearest_key != self._key))
         nodes = self._nodes
         if nearest is None:
             nodes.hide("/nearest", "/nearest_way")

@@ -256,8 +256,7 @@ class RegionFeature(Feature):
             self._margin_html.content = html_block(f"<b>Margin here</b>, {what}: {text}")
         with self._server.atomic():
             workspace.draw_patches(self._nodes, "/wall", patches)
-            below = (0.0, 0.0, -_BELOW * self._size)
-            self._nodes.label("/platform/left", text, below, "top-center", _TEXT_SCALE)
+            self._nodes.label("/platform/left", text, (0.0, 0.0, -_BELOW * self._size), "top-center", _TEXT_SCALE)
 
     def _follow_slice(self, levels: Levels, region: Region, pose: Pose) -> None:
         unit = force_unit(levels.robot)

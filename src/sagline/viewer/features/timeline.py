@@ -129,8 +129,7 @@ class TimelineFeature(Feature):
         self._channel.send("timeline", {"kind": played.name, "speeds": SPEEDS, **message})
 
     def _now(self) -> dict[str, Any]:
-        player = self._player
-        return {name: getattr(player, name) for name in ("time", "playing", "speed", "following")}
+        return {name: getattr(self._player, name) for name in ("time", "playing", "speed", "following")}
 
     def _on_scrub(self, value: Any, _: int) -> None:
         if self._player.played is not None and _is_number(value):
