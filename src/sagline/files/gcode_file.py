@@ -14,11 +14,10 @@ from sagline.core.arguments import brief, choice, file_path
 from sagline.core.arrays import FARTHEST, Array, Indices, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.files.gcode_moves import Point
 from sagline.files.gcode_program import OFFSETS, Dialect, Settings, program_moves
 from sagline.files.reading import read_text
 from sagline.files.table import line_error
-from sagline.motion.contour import Samples, samples_along
+from sagline.motion.contour import Point, Samples, samples_along
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import MOST_SAMPLES, SAMPLE_BYTES
 from sagline.robot.pose import Pose
@@ -102,10 +101,8 @@ def load_gcode(
         >>> import sagline as sl
         >>> path = sl.load_gcode("part.ngc", offsets={"G54": (0, 0, 1)})  # doctest: +SKIP
     """
-    path = file_path(file)
-    settings = _settings(path, rapid, acceleration, tolerance, offsets, start, dialect, rate)
     count, found = 0, list[Samples]()
-    for part in _samples(path, *settings):
+    for part in _samples(file, rapid, acceleration, tolerance, offsets, start, dialect, rate):
         count += len(part.time)
         check_memory(f"a path of {count:,} or more samples", SAMPLE_BYTES * count, "Use gcode_parts, or a lower rate.")
         found.append(part)
@@ -150,13 +147,12 @@ def gcode_parts(
         >>> for part in sl.gcode_parts("house.gcode", tolerance=0.001):  # doctest: +SKIP
         ...     plan = sl.inverse(robot, part.path, wrench=hose_at(part.path.pose))
     """
-    path = file_path(file)
-    settings = _settings(path, rapid, acceleration, tolerance, offsets, start, dialect, rate)
-    return (ProgramPart(_path(part), locked(part.line)) for part in _samples(path, *settings))
+    samples = _samples(file, rapid, acceleration, tolerance, offsets, start, dialect, rate)
+    return (ProgramPart(_path(part), locked(part.line)) for part in samples)
 
 
-def _settings(
-    path: FilePath,
+def _samples(
+    file: str | os.PathLike[str],
     rapid: float,
     acceleration: float,
     tolerance: float,
@@ -164,8 +160,9 @@ def _settings(
     start: ArrayLike | None,
     dialect: Dialect | None,
     rate: float,
-) -> tuple[Settings, float, float]:
-    """Checked settings, acceleration [m/s^2] and samples per second [1/s]."""
+) -> Iterator[Samples]:
+    """Samples of a program; the arguments are checked at once."""
+    path = file_path(file)
     if dialect is None:
         dialect = "marlin" if path.suffix.lower() in PRINTER_SUFFIXES else "linuxcnc"
     else:
@@ -178,7 +175,7 @@ def _settings(
         dialect,
     )
     acceleration = number(acceleration, "acceleration", "m/s^2", above=0.0)
-    return settings, acceleration, number(rate, "rate", "1/s", above=0.0)
+    return _read(path, settings, acceleration, number(rate, "rate", "1/s", above=0.0))
 
 
 def _offsets(offsets: Any) -> dict[str, Point]:
@@ -195,7 +192,7 @@ def _point(value: ArrayLike, item: str) -> Point:
     return cast(Point, tuple(point.tolist()))
 
 
-def _samples(path: FilePath, settings: Settings, acceleration: float, rate: float) -> Iterator[Samples]:
+def _read(path: FilePath, settings: Settings, acceleration: float, rate: float) -> Iterator[Samples]:
     text = read_text(path, GCODE_LIMIT)
     try:
         yield from samples_along(program_moves(path, text, settings), acceleration, rate, MOST_SAMPLES / rate)

@@ -11,9 +11,8 @@ from typing import Final, Literal, NamedTuple, NoReturn, cast
 
 from sagline.core.arrays import FARTHEST
 from sagline.core.errors import FileError, printable
-from sagline.files.gcode_moves import Point, Row, moves_of
 from sagline.files.table import line_error
-from sagline.motion.contour import EXACT_STOP, LEAST, Moves
+from sagline.motion.contour import EXACT_STOP, LEAST, Moves, Point, Row, moves_of
 
 Dialect = Literal["linuxcnc", "marlin"]
 

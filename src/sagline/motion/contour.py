@@ -5,9 +5,10 @@ The blocks of moves are processed one after another, so that the memory does not
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,7 @@ LEAST: Final = 1e-12  # [m], a shorter move is a rounding error
 EXACT_STOP: Final = -1.0  # tolerance of a move that ends at rest
 BLOCK: Final = 1 << 16  # largest number of samples per block
 
-T = TypeVar("T", bound="Moves")
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,19 +45,21 @@ class Moves:
     dwell: Array  # time at rest [s], shape (M,); zero for a motion
     line: Indices  # line of the program, shape (M,)
     room: Array  # largest length that each of two rounded corners may take [m], shape (M,)
+    passed: Flags  # True if the end is passed without a stop, shape (M,); False before the corners are rounded
+    turn: Array  # change of direction at an end that is passed without an arc [rad], shape (M,)
 
     def __len__(self) -> int:
         """Number of moves M."""
         return len(self.length)
 
-    def __getitem__(self: T, which: Any) -> T:
+    def __getitem__(self, which: Any) -> Moves:
         """The selected moves."""
-        return type(self)(**{each.name: getattr(self, each.name)[which] for each in fields(self)})
+        return Moves(**{each.name: getattr(self, each.name)[which] for each in fields(self)})
 
-    def and_then(self: T, other: T) -> T:
+    def and_then(self, other: Moves) -> Moves:
         """These moves, then `other`."""
         pairs = {each.name: (getattr(self, each.name), getattr(other, each.name)) for each in fields(self)}
-        return type(self)(**{name: np.concatenate(pair) for name, pair in pairs.items()})
+        return Moves(**{name: np.concatenate(pair) for name, pair in pairs.items()})
 
     def tangent(self, at: Array) -> Array:
         """Unit tangents (M, 3) at the arc lengths `at` (M,) [m]; zero for a dwell."""
@@ -66,12 +69,58 @@ class Moves:
         return unit
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Joined(Moves):
-    """Moves and arcs in rounded corners."""
+class Row(NamedTuple):
+    """A move: where it ends, its arc, and its speed."""
 
-    passed: Flags  # True if the end is passed without a stop, shape (M,)
-    turn: Array  # change of direction at an end that is passed without an arc [rad], shape (M,)
+    x: float
+    y: float
+    z: float
+    center_x: float
+    center_y: float
+    center_z: float
+    normal: float  # axis of an arc: 0, 1 or 2
+    angle: float  # [rad], about the normal; 0 for a line
+    speed: float  # [m/s]
+    tolerance: float  # [m]
+    dwell: float  # [s]
+    line: float
+
+
+def moves_of(numbers: array[float], start_of_all: Point) -> Moves:
+    """Moves from the numbers of all rows; `start_of_all`: start of the first move [m]."""
+    rows = np.array(numbers).reshape(-1, len(Row._fields))
+    end = rows[:, :3]
+    start = np.vstack((start_of_all, end))[:-1]
+    center, axis, angle = rows[:, 3:6], rows[:, 6].astype(np.int64), rows[:, 7]
+    arc, dwell = angle != 0.0, rows[:, 10]
+    normal = np.eye(3)[axis] * arc[:, None]
+    shift = end - start
+    out, last = start - center, end - center
+    out = np.where(arc[:, None], out - normal * np.sum(out * normal, axis=1, keepdims=True), 0.0)
+    last = np.where(arc[:, None], last - normal * np.sum(last * normal, axis=1, keepdims=True), 0.0)
+    radius, final = np.linalg.norm(out, axis=1), np.linalg.norm(last, axis=1)
+    rise = normal * np.sum(shift * normal, axis=1, keepdims=True)
+    path = np.hypot(0.5 * (radius + final) * angle, np.linalg.norm(rise, axis=1))
+    length = np.where(dwell > 0.0, 0.0, np.where(arc, path, np.linalg.norm(shift, axis=1)))
+    whole = np.where(length > 0.0, length, 1.0)
+    radial = out / np.where(arc, radius, 1.0)[:, None]
+    return Moves(
+        origin=np.where(arc[:, None], start - out, start),
+        direction=np.where(arc[:, None], rise, shift) / whole[:, None],
+        radial=radial,
+        side=np.cross(normal, radial) * np.sign(angle)[:, None],
+        radius=radius,
+        growth=np.where(arc, final - radius, 0.0) / whole,
+        turning=np.abs(angle) / whole,
+        length=length,
+        speed=rows[:, 8],
+        tolerance=rows[:, 9],
+        dwell=dwell,
+        line=rows[:, 11].astype(np.int64),
+        room=0.5 * length,
+        passed=np.zeros(len(rows), dtype=np.bool_),
+        turn=np.zeros(len(rows)),
+    )
 
 
 class Samples(NamedTuple):
@@ -88,7 +137,7 @@ class Samples(NamedTuple):
 class _Timed(NamedTuple):
     """Moves with their times. Each move accelerates, keeps its speed, and decelerates."""
 
-    moves: _Joined
+    moves: Moves
     enter: Array  # speed at the start [m/s], shape (M,)
     cruise: Array  # largest speed [m/s], shape (M,)
     leave: Array  # speed at the end [m/s], shape (M,)
@@ -121,7 +170,7 @@ def samples_along(blocks: Iterable[Moves], acceleration: float, rate: float, mos
         start, taken = float(ends[-1]), stop
 
 
-def _joined(blocks: Iterable[Moves]) -> Iterator[_Joined]:
+def _joined(blocks: Iterable[Moves]) -> Iterator[Moves]:
     """Moves with rounded corners. The last move is held back until its corner with the next block is known."""
     held: Moves | None = None
     for block in blocks:
@@ -132,14 +181,10 @@ def _joined(blocks: Iterable[Moves]) -> Iterator[_Joined]:
         else:
             held = chain
     if held is not None and len(held):
-        yield _with_turns(held, np.zeros(1, dtype=np.bool_), np.zeros(1))
+        yield held
 
 
-def _with_turns(moves: Moves, passed: Flags, turn: Array) -> _Joined:
-    return _Joined(**{each.name: getattr(moves, each.name) for each in fields(moves)}, passed=passed, turn=turn)
-
-
-def _rounded(chain: Moves) -> tuple[_Joined, Moves]:
+def _rounded(chain: Moves) -> tuple[Moves, Moves]:
     """All moves of `chain` except the last, with an arc in each rounded corner; and the last move, shortened."""
     first, second = chain[:-1], chain[1:]
     before, after = first.tangent(first.length), second.tangent(np.zeros(len(second)))
@@ -154,6 +199,7 @@ def _rounded(chain: Moves) -> tuple[_Joined, Moves]:
     cut = np.where(bent, cut, 0.0)
     radius = np.where(bent, cut / np.tan(half), 1.0)
     inward = (after - cosine[:, None] * before) / np.where(bent, np.sin(2.0 * half), 1.0)[:, None]
+    passed = bent | (moving & (angle <= SMOOTH))
     arcs = replace(
         first,
         origin=second.origin - cut[:, None] * before + radius[:, None] * inward,
@@ -166,25 +212,25 @@ def _rounded(chain: Moves) -> tuple[_Joined, Moves]:
         length=np.where(bent, radius * angle, 0.0),
         speed=np.minimum(first.speed, second.speed),
         dwell=np.zeros(len(first)),
+        passed=passed,
     )
     head = np.append(0.0, cut)
     chain = replace(
         chain, origin=chain.origin + head[:, None] * chain.direction, length=chain.length - head - np.append(cut, 0.0)
     )
-    passed = bent | (moving & (angle <= SMOOTH))
     order = np.arange(2 * len(first)).reshape(2, -1).T.ravel()  # each move, then its corner
-    turn = np.concatenate((np.where(passed & ~bent, angle, 0.0), np.zeros(len(first))))
-    both = _with_turns(chain[:-1].and_then(arcs), np.concatenate((passed, passed)), turn)[order]
+    own = replace(chain[:-1], passed=passed, turn=np.where(passed & ~bent, angle, 0.0))
+    both = own.and_then(arcs)[order]
     return both[(both.length > LEAST) | (both.dwell > 0.0)], chain[-1:]
 
 
-def _timed(blocks: Iterable[_Joined], acceleration: float) -> Iterator[tuple[_Timed, bool]]:
+def _timed(blocks: Iterable[Moves], acceleration: float) -> Iterator[tuple[_Timed, bool]]:
     """Moves with their speeds; and True for the last block.
 
     The speeds at the end of a block depend on the next block. Moves are held back until the speeds at their ends no
     longer depend on later moves.
     """
-    held: _Joined | None = None
+    held: Moves | None = None
     entry = 0.0
     for block in blocks:
         chain = block if held is None else held.and_then(block)
@@ -207,7 +253,7 @@ def _limit(moves: Moves, acceleration: float) -> Array:
     return limit
 
 
-def _squares(chain: _Joined, acceleration: float, entry: float, end: float) -> Array:
+def _squares(chain: Moves, acceleration: float, entry: float, end: float) -> Array:
     """Squares of the largest speeds (M + 1,) at the ends of the moves, which the acceleration allows to reach."""
     limit, turn = _limit(chain, acceleration), chain.turn[:-1]
     # a turn between short lines counts as an arc that takes half of each line
@@ -224,7 +270,7 @@ def _squares(chain: _Joined, acceleration: float, entry: float, end: float) -> A
     return squares
 
 
-def _with_times(moves: _Joined, squares: Array, acceleration: float) -> _Timed:
+def _with_times(moves: Moves, squares: Array, acceleration: float) -> _Timed:
     """Largest speeds and durations of moves from the squares of the speeds (M + 1,) at their ends."""
     before, after = squares[:-1], squares[1:]
     top = np.minimum(_limit(moves, acceleration), 0.5 * (before + after) + acceleration * moves.length)
