@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -22,10 +22,6 @@ ROBOTS: Final = (".yaml", ".yml")
 WHOLE: Final = ".nc"
 TABLE: Final = ".csv"
 FIGURES: Final = (".png", ".svg", ".pdf")
-DEVIATIONS: Final = (
-    *("length_deviation", "tension_deviation", "position_deviation"),
-    *("rotation_deviation", "swivel_deviation", "frequency_deviation"),
-)
 WITHOUT_PLAN: Final = opt.only_without("--plan")
 VALIDATION: Final = ("folds", "position_m", "position_before_m", "tension_n", "tension_before_n")
 
@@ -81,7 +77,8 @@ class _Options:
     @property
     def deviations(self) -> dict[str, float]:
         """The given standard deviations, by field of `Sensors`."""
-        return {name: value for name in DEVIATIONS if (value := getattr(self, name)) is not None}
+        names = (each.name for each in fields(self) if each.name.endswith("_deviation"))
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
     def files(self, robot: str) -> list[Path]:
         """Files of `out`. In a folder, the names of files begin with the name of `robot`."""

@@ -19,7 +19,7 @@ from sagline.cli.terminal import show_note, show_text
 from sagline.cli.values import quantity
 from sagline.control.real_time import interrupt_calls
 from sagline.core.arrays import Array
-from sagline.core.errors import nearest
+from sagline.core.errors import did_you_mean
 from sagline.files.pose_text import pose_of_text
 
 EVERY: Final = 0.2  # time between two updates of the status line [s]
@@ -169,8 +169,7 @@ class OperatorSession:
             return "", lambda: None
         try:
             if word not in self._words:
-                near = nearest(word, self._words)
-                step = f"Did you mean {near}?" if near else "help lists them."
+                step = did_you_mean(word, self._words, "help lists them.")
                 raise sl.InvalidValueError("the line", repr(text), "one that begins with a known word", step)
             _, _, parse, act = self._words[word]
             arguments = parse(rest.strip())

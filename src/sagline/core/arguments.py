@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from sagline.core.errors import FileError, InvalidValueError, nearest, printable
+from sagline.core.errors import FileError, InvalidValueError, did_you_mean, printable
 
 T = TypeVar("T")
 
@@ -109,8 +109,7 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
     words = tuple(allowed)
     if isinstance(value, str) and value in words:
         return str(value)  # numpy has its own string type
-    near = nearest(value, words) if isinstance(value, str) else None
-    step = f"Choose one of them as {item}." if near is None else f"Did you mean {near}?"
+    step = did_you_mean(value, words, f"Choose one of them as {item}.")
     raise InvalidValueError(item, brief(value), ", ".join(words), step)
 
 

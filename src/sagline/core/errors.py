@@ -163,6 +163,12 @@ def _first_words(text: str, room: int) -> str:
     return f"{', '.join(words[:count])} and {len(words) - count} more"
 
 
+def did_you_mean(word: object, known: Iterable[str], otherwise: str) -> str:
+    """Next step in a message about an unknown word: the most similar word of `known`, or `otherwise`."""
+    near = nearest(word, known) if isinstance(word, str) else None
+    return f"Did you mean {near}?" if near else otherwise
+
+
 def shortened(parts: Sequence[str], room: int) -> list[str]:
     """Printable texts of `parts` with together at most `room` characters; long parts lose their middle."""
     texts = [printable(part) for part in parts]

@@ -83,5 +83,5 @@ def _constructed(kind: type[Any], values: dict[str, Any]) -> Any:
 
 
 def units(kind: type[Any]) -> dict[str, str]:
-    """Dictionary from the fields of the input type `kind` to their units; "" for a dimensionless field."""
-    return {field.name: field.metadata["unit"] for field in fields(kind)}
+    """Dictionary from the fields of the input type `kind` to their units; without fields that have none."""
+    return {field.name: field.metadata["unit"] for field in fields(kind) if "unit" in field.metadata}

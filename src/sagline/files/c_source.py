@@ -180,7 +180,7 @@ def _words(
         "cables": str(m),
         "freedoms": str(n),
         "translations_count": str(n - int(turning.sum())),
-        "methods": ", ".join(method_names(methods)),
+        "methods": ", ".join(_method_names(methods)),
         "rules": ",\n    ".join(_rule(each, real) for each in options),
         "limits_of": str(options[0].limits[0]),
         "statuses": _statuses(),
@@ -193,7 +193,7 @@ def _words(
     }
 
 
-def method_names(methods: Sequence[TensionMethod]) -> list[str]:
+def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
     """C name of each method: the name of its class, with a number if several methods have this class."""
     found: list[str] = []
     for method in methods:

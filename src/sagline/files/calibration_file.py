@@ -149,7 +149,6 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
             quantities += group
     sizes = {str(name): size for name, size in data.sizes.items()}
     kind_rows = max(OLDEST, min(sizes.get("kind_row", 0), KIND_ROWS))  # older files do not have the last kinds
-    sizes = {str(name): size for name, size in data.sizes.items()}
     readings = (3 if "swivel_deviation" in data.variables else 2) * m + 6
     if "frequency_deviation" in data.variables:
         readings = max(sizes.get("reading", 0), readings + 1)

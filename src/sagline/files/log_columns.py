@@ -12,10 +12,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from pydantic import model_validator
 
-from sagline.core.errors import FileError, nearest
+from sagline.core.errors import FileError, did_you_mean
 from sagline.files.quantity import plain_number
 from sagline.files.reading import read_bytes, read_text
-from sagline.files.table import TABLE_LIMIT, csv_rows, line_error
+from sagline.files.table import TABLE_LIMIT, csv_rows, line_error, lines_above_header
 from sagline.files.yaml_text import YamlEntry
 
 ARRAYS: Final = (".npz", ".mat")  # files with arrays; their rows have the line numbers from 2
@@ -65,8 +65,7 @@ def log_text(path: Path, columns: Mapping[str, ColumnEntry] | None) -> str:
         for name, column in _pairs(path, key, entry, source, numbers):
             if column not in source.cells:
                 shown = ", ".join(list(source.cells)[:12])
-                near = nearest(column, source.cells)
-                step = f"Did you mean {near}?" if near else f"The file has: {shown}."
+                step = did_you_mean(column, source.cells, f"The file has: {shown}.")
                 raise FileError(path, f"has no column {column!r}", step, item=f"columns.{key}")
             unit = entry.unit or source.units.get(column, "")
             table[f"{name} [{unit}]" if unit else name] = _scaled(source.cells[column], entry.scale)
@@ -113,7 +112,7 @@ def _read_csv(path: Path) -> _Source:
     """Columns of a CSV file; the comments above the header stay."""
     text = read_text(path, TABLE_LIMIT)
     lines = text.split("\n")
-    above = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
+    above = lines_above_header(lines)
     header, rows, numbers = 0, [], []
     names: list[str] = []
     units: dict[str, str] = {}

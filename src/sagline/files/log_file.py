@@ -8,32 +8,33 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import nullcontext
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 
 from sagline.calibration.log import Sensors, WinchLog
 from sagline.core.arguments import file_path, instance, optional
 from sagline.core.arrays import Array, locked
-from sagline.core.errors import FileError, nearest
+from sagline.core.errors import FileError, did_you_mean
+from sagline.core.fields import units
 from sagline.files.log_columns import ARRAYS, ColumnEntry, log_text
 from sagline.files.path_file import EULER, QUATERNION
-from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry
-from sagline.files.quantity import in_si
+from sagline.files.pose_text import PoseEntry
 from sagline.files.reading import read_text, value_errors
-from sagline.files.table import TABLE_LIMIT, CsvTable, column_of_cable, line_error, separator_of
+from sagline.files.table import (
+    TABLE_LIMIT,
+    CsvTable,
+    column_of_cable,
+    line_error,
+    lines_above_header,
+    names_of_cables,
+    separator_of,
+)
 from sagline.files.writing import write_text
-from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
+from sagline.files.yaml_text import YAML_LIMIT, parse_mapping, schema_of, validate
 from sagline.robot.pose import Pose
 
-DEVIATIONS: Final = {
-    "length_deviation": "m",
-    "tension_deviation": "N",
-    "position_deviation": "m",
-    "rotation_deviation": "rad",
-    "swivel_deviation": "rad",
-    "frequency_deviation": "Hz",
-}
+DEVIATIONS: Final = units(Sensors)
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
 _NEAR: Final = 0.7  # a word that is this similar to a key is a misspelt key; "name" and "frame" are less similar
@@ -61,26 +62,16 @@ USUAL: Final = {
 }  # standard deviations of sensors
 
 
-class _Sensors(YamlEntry):
+class _Sensors(schema_of(DEVIATIONS)):  # type: ignore[misc]
     """Keys of the comments above the columns."""
 
-    length_deviation: Any = None
-    tension_deviation: Any = None
-    position_deviation: Any = None
-    rotation_deviation: Any = None
-    swivel_deviation: Any = None
-    frequency_deviation: Any = None
     frame: PoseEntry | None = None
-    target: Any = None
+    target: Annotated[Any, "m"] = None
 
     def sensors(self, path: Path) -> Sensors:
         """Sensors that the keys describe; the path of the file is used in messages."""
         with value_errors(path):
-            values: dict[str, Any] = {
-                name: in_si(value, unit, name)
-                for name, unit in (DEVIATIONS | {"target": "m"}).items()
-                if (value := getattr(self, name)) is not None
-            }
+            values: dict[str, Any] = {key: self.si(key) for key in self.units() if getattr(self, key) is not None}
             if self.frame is not None:
                 values["frame"] = self.frame.pose("frame")
             return Sensors(**values)
@@ -95,7 +86,7 @@ class _LogMap(_Sensors):
 def _sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
     """Sensors from the comments above the header, and the text without these comments."""
     lines = text.split("\n")
-    count = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
+    count = lines_above_header(lines)
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
     rows = "\n".join([""] * count + lines[count:])
     if not any(said):
@@ -142,34 +133,28 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     commanded = {f"{name}{COMMANDED}": optional_units[name] for name in _POSE_COLUMNS}
     units = {"time": "s", **readings, **optional_units, **commanded}
     table = CsvTable.read(path, text, units, gaps=frozenset((*readings, *optional_units)))
-    kinds = [kind for kind in ("count", "length") if any(name in table.columns for name in _names(kind, cables))]
+    kinds = [kind for kind in ("count", "length") if table.columns.keys() & set(names_of_cables(kind, cables))]
     if len(kinds) != 1:
         what = "columns of counts and of lengths" if kinds else "neither columns count_0, ... nor length_0, ..."
         raise line_error(path, table.header, f"{what}; allowed: one of the two")
-    if missing := [name for name in _names(kinds[0], cables) if name not in table.columns]:
+    if missing := [name for name in names_of_cables(kinds[0], cables) if name not in table.columns]:
         shown = ", ".join(missing[:3]) + (", ..." if len(missing) > 3 else "")
         raise line_error(path, table.header, f"missing column {shown}; the last is {kinds[0]}_{cables - 1}")
     table.check_rows()
     return table, cables
 
 
-def _names(kind: str, cables: int) -> list[str]:
-    return [f"{kind}_{k}" for k in range(cables)]
-
-
 def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
     """Fields of the log, without its sensors."""
-    columns = table.columns
-    position = _stack_columns(table, XYZ, all_of_them=False)
     return {
-        "counts": _stack_columns(table, _names("count", cables)),
-        "unstrained_length": _stack_columns(table, _names("length", cables)),
-        "load_cells": _stack_columns(table, _names("load_cell", cables), all_of_them=False),
-        "swivel": _stack_columns(table, _names("swivel", cables), all_of_them=False),
+        "counts": _stack_columns(table, names_of_cables("count", cables)),
+        "unstrained_length": _stack_columns(table, names_of_cables("length", cables)),
+        "load_cells": _stack_columns(table, names_of_cables("load_cell", cables), all_of_them=False),
+        "swivel": _stack_columns(table, names_of_cables("swivel", cables), all_of_them=False),
         "frequency": _frequencies(table),
-        "position": position,
+        "position": _stack_columns(table, XYZ, all_of_them=False),
         "rotation": _rotation(table, ""),
-        "time": columns.get("time"),
+        "time": table.columns.get("time"),
         "commanded": _commanded(table),
     }
 
@@ -209,19 +194,15 @@ def _rotation(table: CsvTable, suffix: str) -> Array | None:
     if given is None:
         return None
     missing = np.isnan(given)
-    part = missing.any(axis=1) & ~missing.all(axis=1)
-    names = ", ".join(name + suffix for name in (euler if quaternion is None else QUATERNION))
-    table.refuse(np.asarray(part), f"one of {names}", np.full(len(given), np.nan), "", "all of them, or blanks in all")
     known = ~missing.all(axis=1)
+    names = ", ".join(name + suffix for name in (euler if quaternion is None else QUATERNION))
+    part = np.asarray(known & missing.any(axis=1))
+    table.refuse(part, f"one of {names}", np.full(len(given), np.nan), "", "all of them, or blanks in all")
+    if quaternion is not None:
+        return table.normalized(quaternion, names)
     found = np.full((len(given), 4), np.nan)
-    if quaternion is None:
-        yaw = [0.0] * (len(EULER) - len(euler))
-        found[known] = Pose.from_euler(np.zeros(3), *yaw, *given[known].T).quaternion
-        return found
-    length = np.linalg.norm(np.where(missing, 0.5, given), axis=1)
-    wrong = np.abs(length - 1.0) > QUATERNION_TOLERANCE
-    table.refuse(wrong, f"the length of {names}", length, "", f"1 to {QUATERNION_TOLERANCE:g}")
-    found[known] = given[known] / length[known, None]
+    yaw = [0.0] * (len(EULER) - len(euler))
+    found[known] = Pose.from_euler(np.zeros(3), *yaw, *given[known].T).quaternion
     return found
 
 
@@ -345,9 +326,9 @@ def _map_of_columns(path: Path) -> tuple[dict[str, ColumnEntry], Sensors | None]
     for key in entry.columns:
         known = key in (*_MAPPED, *_MODES) or key.removesuffix(COMMANDED) in _POSE_COLUMNS
         if not (known or _NUMBERED.fullmatch(key)):
-            near = nearest(key, (*_MAPPED, *_POSE_COLUMNS))
-            step = f"Did you mean {near}?" if near else "Remove it."
-            reason = f"columns.{key} is an unknown key; allowed: {', '.join((*_MAPPED, *_POSE_COLUMNS))}"
+            allowed = (*_MAPPED, *_POSE_COLUMNS)
+            step = did_you_mean(key, allowed, "Remove it.")
+            reason = f"columns.{key} is an unknown key; allowed: {', '.join(allowed)}"
             raise FileError(path, reason, step, item=f"columns.{key}")
     return entry.columns, entry.sensors(path) if entry.model_fields_set - {"columns"} else None
 

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from sagline.control.recording import Event
 from sagline.core.arguments import file_path
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError
 from sagline.core.memory import check_memory
 from sagline.files.mcap_layout import END, EVENT, EVERY, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
 from sagline.files.mcap_writer import check_packages
 from sagline.files.netcdf import check_version
 from sagline.files.packed import unpack
-from sagline.files.reading import check_regular, unreadable
+from sagline.files.reading import check_regular, system_errors, value_errors
 from sagline.files.robot_file import parse_robot
 from sagline.robot.robot import Robot
 
@@ -99,7 +99,7 @@ class LogReader:
 
     def _bytes(self) -> bytes:
         path = self.log.path
-        try:
+        with system_errors(path), value_errors(path):
             status = path.stat()
             check_regular(path, status.st_mode)
             if status.st_size < self._offset:
@@ -108,12 +108,6 @@ class LogReader:
             with path.open("rb") as file:
                 file.seek(self._offset)
                 return file.read(status.st_size - self._offset)
-        except FileNotFoundError:
-            raise FileError(path, "does not exist", "Check its name.") from None
-        except InvalidValueError as error:
-            raise FileError.of(path, error) from None
-        except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-            raise unreadable(path, error) from None
 
     def _check_kind(self, data: bytes) -> None:
         if data[: len(MAGIC)] == MAGIC:

@@ -21,7 +21,7 @@ import numpy as np
 
 from sagline.core.arguments import file_path, instance
 from sagline.core.errors import FileError, InvalidValueError, shortened
-from sagline.files.reading import HDF_BEGIN, check_regular, unreadable
+from sagline.files.reading import HDF_BEGIN, check_regular, system_errors
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.variables import PARTS
 from sagline.files.writing import atomic_file
@@ -180,13 +180,9 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
 
 def _read_dataset(path: Path, content: Format[Any]) -> Dataset:
     """Read the data set of an undamaged file. The digest is checked before the content is read."""
-    try:
+    with system_errors(path):
         check_regular(path, path.stat().st_mode)  # a pipe is not opened, because opening would wait for its writer
         right = _digest_is_right(path)
-    except FileNotFoundError:
-        raise FileError(path, "does not exist", "Check its name.") from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        raise unreadable(path, error) from None
     if right is False:
         raise FileError(path, "has changed since it was written: it was damaged or edited", content.again)
     if right is None:
@@ -197,15 +193,14 @@ def _read_dataset(path: Path, content: Format[Any]) -> Dataset:
 @contextmanager
 def _file_errors(path: Path) -> Iterator[None]:
     """Convert errors about values of a file to a FileError with the name of the file."""
+    step = "Write it again; it is incomplete or was edited."
     try:
         yield
     except KeyError as error:
-        step = "Write it again; it is incomplete or was edited."
         raise FileError(path, f"has no {error.args[0]}", step, item=str(error.args[0])) from None
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:  # parts that do not agree
-        step = "Write it again; it is incomplete or was edited."
         (text,) = shortened((f"{type(error).__name__}: {error}",), 120)
         raise FileError(path, f"has parts that do not agree ({text})", step) from error
 

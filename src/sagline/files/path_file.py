@@ -13,8 +13,9 @@ from sagline.calibration.observations import counts_at, has_drum_data
 from sagline.core.arguments import file_path
 from sagline.core.arrays import FARTHEST, Array
 from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.fields import units
 from sagline.files.gcode_file import SUFFIXES, load_gcode
-from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry
+from sagline.files.pose_text import PoseEntry
 from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
 from sagline.files.writing import write_text
@@ -57,10 +58,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
     if "qx" not in table.columns:
         return path_from_samples(time, Pose.from_euler(position, 0.0, 0.0, 0.0))
     quaternion = np.stack([table.columns[name] for name in QUATERNION], axis=-1)
-    length = np.linalg.norm(quaternion, axis=1)
-    wrong = np.abs(length - 1.0) > QUATERNION_TOLERANCE
-    table.refuse(wrong, "the length of qx, qy, qz, qw", length, "", f"1 to {QUATERNION_TOLERANCE:g}")
-    return path_from_samples(time, Pose.from_quaternion(position, quaternion / length[:, np.newaxis]))
+    return path_from_samples(time, Pose.from_quaternion(position, table.normalized(quaternion, "qx, qy, qz, qw")))
 
 
 def _check_columns(table: CsvTable) -> None:
@@ -202,8 +200,7 @@ def _durations(poses: Pose) -> list[float]:
 def _about(plan: CalibrationPoses) -> dict[str, Any]:
     """Header entry of the file: robot, version of sagline, and purpose of the poses."""
     numbers = plan.parameters
-    names = [f"{name}_deviation" for name in ("length", "tension", "position", "rotation", "swivel", "frequency")]
-    given = {name: getattr(plan.sensors, name) for name in names}
+    given = {name: getattr(plan.sensors, name) for name in units(type(plan.sensors))}
     errors = {
         f"{label} [{unit}]" if unit else label: _plain(error)
         for label, unit, error in zip(numbers.labels, numbers.units, plan.expected_error, strict=True)

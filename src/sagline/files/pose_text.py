@@ -9,12 +9,11 @@ import numpy as np
 
 from sagline.core.arrays import FARTHEST, Array, checked
 from sagline.core.errors import InvalidValueError
-from sagline.files.quantity import in_si, plain_number
+from sagline.files.quantity import QUATERNION_TOLERANCE, in_si, plain_number
 from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
 STRONGEST: Final = 1e12  # largest force and moment [N, N m]: larger than on any machine, and far below overflow
-QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, because files have few decimals
 POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
 WRENCH_STEP: Final = (
     "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."

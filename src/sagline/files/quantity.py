@@ -18,6 +18,7 @@ Nested = float | list["Nested"]
 
 LARGEST: Final = 1e50  # largest number in SI; products of a few such numbers do not overflow
 REACH: Final = f"numbers up to {LARGEST:g}"
+QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, because files have few decimals
 _LONGEST: Final = 60  # largest number of characters of a number with its unit; a float64 needs 24
 
 _DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"

@@ -40,6 +40,17 @@ def value_errors(path: Path | str) -> Iterator[None]:
         raise FileError.of(path, error) from None
 
 
+@contextmanager
+def system_errors(path: Path) -> Iterator[None]:
+    """Convert errors of the system for a file that must exist to a FileError."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise FileError(path, "does not exist", "Check its name.") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        raise unreadable(path, error) from None
+
+
 def unreadable(path: Path, error: Exception) -> FileError:
     """Create the FileError for a file that the system cannot read."""
     reason = getattr(error, "strerror", None) or error

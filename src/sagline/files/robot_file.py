@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sagline.core.arguments import brief, file_path, instance
 from sagline.core.arrays import Array
-from sagline.core.errors import FileError, InvalidValueError, nearest
+from sagline.core.errors import FileError, InvalidValueError, did_you_mean
 from sagline.files.reading import exists, read_text, value_errors
 from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validate
@@ -132,8 +132,7 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
         return data
     name = data.pop("base")
     if name not in robot_names():
-        near = nearest(name, robot_names()) if isinstance(name, str) else None
-        step = f"Did you mean {near}?" if near else "Name one of them, or leave base out."
+        step = did_you_mean(name, robot_names(), "Name one of them, or leave base out.")
         raise FileError.of(origin, InvalidValueError("base", brief(name), ", ".join(robot_names()), step))
     base = _on_base(parse_mapping(preset_text(name), f"preset {name}"), origin)
     del base["name"]  # the robot needs its own name, because files of results have the name of the robot

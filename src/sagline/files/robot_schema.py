@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import numpy as np
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, model_validator
 
 from sagline.cables.cable import Cable
 from sagline.core.arguments import label
@@ -15,7 +14,7 @@ from sagline.core.arrays import Array, checked, exactly, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import units
 from sagline.files.quantity import plain_number
-from sagline.files.yaml_text import YamlEntry
+from sagline.files.yaml_text import YamlEntry, schema_of
 from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot, box_inertia, cylinder_inertia
 from sagline.robot.tolerances import UNCERTAIN, Provenance, of_share, value_of
@@ -115,12 +114,6 @@ class _RobotPart(YamlEntry):
         )
 
 
-def _with_keys(units_of_keys: Mapping[str, str]) -> Any:
-    """Create the schema of a mapping with optional keys. `units_of_keys`: unit of each key."""
-    keys: dict[str, Any] = {name: (Annotated[Any, unit], None) for name, unit in units_of_keys.items()}
-    return create_model("_Keys", __base__=YamlEntry, **keys)
-
-
 class _Cables(_RobotPart):
     """Schema of the cables. Each value is one number for all cables, or a list."""
 
@@ -151,7 +144,7 @@ class _Cables(_RobotPart):
         return Cable.from_material(density, self.si("youngs_modulus", "cables."), width, **known)
 
 
-class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
+class _Winches(schema_of(units(Winch))):  # type: ignore[misc]
     """Schema of the winches and pulleys. Each value is one number for all cables, or a list."""
 
     swivel_axis: Annotated[Any, ""] = None  # a vector or a word
@@ -232,7 +225,7 @@ class _TestBox(YamlEntry):
     tilt: Annotated[Any, "rad"] = 0.0
 
 
-class _Deviations(_with_keys({name: what.unit for name, what in UNCERTAIN.items()})):  # type: ignore[misc]
+class _Deviations(schema_of({name: what.unit for name, what in UNCERTAIN.items()})):  # type: ignore[misc]
     """Schema of the standard deviations of a robot's values: one number per field, per axis or per value."""
 
     def of(self, robot: Robot, within: str) -> dict[str, Any]:

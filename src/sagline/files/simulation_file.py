@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sagline.core.arguments import choice, instance
-from sagline.core.arrays import Array, number
+from sagline.core.arrays import Array, number, refuse_first
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.results import EnergyBalance, Occurrence, Simulation
 from sagline.dynamics.simulation.winches import SecondOrder
@@ -126,8 +126,8 @@ def _check_settings(attributes: Any) -> None:
 def _check_times(time: Array) -> None:
     if time.size < 2:
         raise InvalidValueError("time", f"of {time.size} samples", "at least the start and the end", STEP)
-    for k in np.flatnonzero(~(np.diff(time) > 0.0))[:1].tolist():
-        raise InvalidValueError(f"time[{k + 1}]", f"{time[k + 1]:g} s", f"> {time[k]:g} s", STEP)
+    late = np.append(False, ~(np.diff(time) > 0.0))
+    refuse_first(late, "time", time, "s", "> {limit:g} s", STEP, np.roll(time, 1))
 
 
 def _check_events(data: Dataset, time: Array, cables: int) -> Array:

@@ -8,7 +8,7 @@ import io
 import os
 import re
 from array import array
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import FileError, InvalidValueError, nearest
-from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
+from sagline.files.quantity import LARGEST, QUATERNION_TOLERANCE, REACH, in_si, plain_number
 from sagline.files.reading import read_text
 
 TABLE_LIMIT: Final = 64.0  # largest size [MB], about half a million rows
@@ -104,6 +104,18 @@ class CsvTable:
             far = self.columns[name] > _TOO_LONG * size
             allowed = f"lengths like {whole}; if these are millimeters, call the column {name} [mm]"
             self.refuse(far, name, self.columns[name], "m", allowed)
+
+    def normalized(self, quaternion: Array, names: str) -> Array:
+        """Unit quaternions (rows, 4) from the columns `names` with few decimals; NaN stays NaN."""
+        length = np.linalg.norm(quaternion, axis=1)
+        wrong = np.abs(length - 1.0) > QUATERNION_TOLERANCE
+        self.refuse(wrong, f"the length of {names}", length, "", f"1 to {QUATERNION_TOLERANCE:g}")
+        return np.asarray(quaternion / length[:, None])
+
+
+def lines_above_header(lines: Sequence[str]) -> int:
+    """Number of blank lines and comments above the header."""
+    return next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
 
 
 def csv_rows(path: Path, text: str, above: int = 0) -> Iterator[tuple[int, list[str]]]:
@@ -210,10 +222,10 @@ def load_readings(
     # Units are in brackets, `time [s],length_0 [mm]`. cable_count: number of cables m of the robot; size: largest
     # extent of the robot [m]; lengths that are a hundred times larger must have another unit
     path = Path(file)
-    names = _columns(kind, cable_count)
+    names = names_of_cables(kind, cable_count)
     other, hint = _OTHERS[kind]
     units = {"time": "s", **dict.fromkeys(names, "m" if kind == "length" else "")}
-    strangers = dict.fromkeys(_columns(other, cable_count), hint)
+    strangers = dict.fromkeys(names_of_cables(other, cable_count), hint)
     table = CsvTable.read(path, read_text(path, TABLE_LIMIT), units, strangers)
     table.check_columns(names, f"; the robot has {cable_count} cables")
     table.check_rows()
@@ -227,7 +239,8 @@ def load_readings(
     return time, locked(np.stack([table.columns[name] for name in names], axis=-1))
 
 
-def _columns(kind: str, cable_count: int) -> list[str]:
+def names_of_cables(kind: str, cable_count: int) -> list[str]:
+    """Names of the columns of all cables: `length_0`, `length_1`, ..."""
     return [f"{kind}_{k}" for k in range(cable_count)]
 
 

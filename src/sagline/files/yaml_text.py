@@ -7,12 +7,12 @@ import reprlib
 from collections.abc import Hashable, Mapping
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar, get_args
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
-from sagline.core.errors import FileError, nearest
+from sagline.core.errors import FileError, did_you_mean
 from sagline.files.quantity import in_si, plain_number
 from sagline.files.reading import error_at_line
 
@@ -52,6 +52,12 @@ class YamlEntry(BaseModel):
         return {key: self.si(key, within) for key in self.units() if key in self.model_fields_set}
 
 
+def schema_of(units_of_keys: Mapping[str, str]) -> Any:
+    """Create the schema of a mapping with optional keys. `units_of_keys`: unit of each key."""
+    keys: dict[str, Any] = {name: (Annotated[Any, unit], None) for name, unit in units_of_keys.items()}
+    return create_model("_Keys", __base__=YamlEntry, **keys)
+
+
 Schema = TypeVar("Schema", bound=YamlEntry)
 
 
@@ -79,9 +85,7 @@ def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, 
             return key, "missing", "", f"Add the key {key}."
         case "extra_forbidden":
             known = list(_at(schema, where[:-1]).model_fields)
-            near = nearest(str(where[-1]), known)
-            next_step = f"Did you mean {near}?" if near else "Remove it."
-            return key, "an unknown key", ", ".join(known), next_step
+            return key, "an unknown key", ", ".join(known), did_you_mean(str(where[-1]), known, "Remove it.")
         case "model_type":
             known = list(_at(schema, where).model_fields)
             return key, found, f"keys {', '.join(known)}", "Give a mapping with keys."

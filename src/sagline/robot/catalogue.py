@@ -14,7 +14,7 @@ from attrs import field, frozen
 from sagline.cables.cable import ROPES, SAFETY
 from sagline.core.arguments import brief, choice
 from sagline.core.arrays import Array, checked, number, refuse_first
-from sagline.core.errors import InvalidValueError, nearest
+from sagline.core.errors import InvalidValueError, did_you_mean
 from sagline.core.fields import given
 from sagline.core.results import set_fields
 from sagline.robot.pose import PoseBox
@@ -44,10 +44,8 @@ def preset_text(name: str) -> str:
     """Text of a preset's robot file."""
     names = robot_names()
     if name not in names:
-        near = nearest(name, names)
-        hint = f"Did you mean {near}? " if near else ""
-        step = f"{hint}To use a robot file, give its path, such as robot.yaml."
-        raise InvalidValueError("robot", repr(name), ", ".join(names), step)
+        step = f"{did_you_mean(name, names, '')} To use a robot file, give its path, such as robot.yaml."
+        raise InvalidValueError("robot", repr(name), ", ".join(names), step.lstrip())
     return (_PRESETS / f"{name}.yaml").read_text(encoding="utf-8")
 
 
@@ -285,16 +283,14 @@ _DIRECT: Final = {
 
 
 def _catalogue() -> dict[str, WinchDrive]:
-    found: dict[str, tuple[float, float, float, float, float, str, str]] = {}
+    found = []
     for model, (gear, rated, peak, inertia) in _GEARED.items():
-        torques = rated / gear, peak / gear
-        found[f"yaskawa-sgmah-{model}"] = gear, inertia, *torques, 4000.0, _GEARED_SOURCE, _GEARED_ASSUMED
+        numbers = gear, inertia * _SHORT, rated / gear, peak / gear, 3000.0 * _TURN, 4000.0 * _TURN
+        found.append(WinchDrive(f"yaskawa-sgmah-{model}", *numbers, _GEARED_SOURCE, _GEARED_ASSUMED))
     for model, (rated, peak, inertia) in _DIRECT.items():
-        found[f"yaskawa-sgmsh-{model}"] = 1.0, inertia, rated, peak, 5000.0, _DIRECT_SOURCE, _DIRECT_ASSUMED
-    return {
-        name: WinchDrive(name, gear, inertia * _SHORT, rated, peak, 3000.0 * _TURN, fastest * _TURN, source, assumed)
-        for name, (gear, inertia, rated, peak, fastest, source, assumed) in found.items()
-    }
+        numbers = 1.0, inertia * _SHORT, rated, peak, 3000.0 * _TURN, 5000.0 * _TURN
+        found.append(WinchDrive(f"yaskawa-sgmsh-{model}", *numbers, _DIRECT_SOURCE, _DIRECT_ASSUMED))
+    return {drive.name: drive for drive in found}
 
 
 _DRIVES: Final = MappingProxyType(_catalogue())
@@ -334,6 +330,5 @@ def winch_drive(name: str) -> WinchDrive:
     word = str(given) if isinstance(given, str) else ""
     if word in _DRIVES:
         return _DRIVES[word]
-    near = nearest(word, _DRIVES)
-    step = f"Did you mean {near}?" if near else "winch_drive_names() lists them."
+    step = did_you_mean(word, _DRIVES, "winch_drive_names() lists them.")
     raise InvalidValueError("name", brief(given), f"one of the {len(_DRIVES)} drives of the catalogue", step)

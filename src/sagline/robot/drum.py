@@ -160,7 +160,12 @@ def not_given(names: Sequence[str]) -> tuple[str, str]:
 def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
     """Table of the drums for kernels, and the lengths off the drums at which layers begin [m]."""
     pitch, width = _given(winches, "groove_pitch"), winches.drum_width
-    _check_width(winches, pitch)
+    if width is not None:
+        allowed, step = (
+            ">= {limit:g} m, its groove_pitch",
+            "A layer has at least one turn; correct one of the two values.",
+        )
+        refuse_first(width < pitch, "winches: drum_width", width, "m", allowed, step, pitch)
     table = np.empty((len(pitch), drum.DRUM_COLUMNS))
     table[:, drum.PITCH_RADIUS] = _given(winches, "drum_radius") + 0.5 * diameter
     table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies in the gap between two turns below
@@ -245,15 +250,6 @@ def _given(winches: Winch, name: str, step: str = "Give it in the robot's winche
     if value is None:
         raise InvalidValueError(f"winches: {name}", "not given", "one value, or one per cable", step)
     return value
-
-
-def _check_width(winches: Winch, pitch: Array) -> None:
-    if (width := winches.drum_width) is not None:
-        allowed, step = (
-            ">= {limit:g} m, its groove_pitch",
-            "A layer has at least one turn; correct one of the two values.",
-        )
-        refuse_first(width < pitch, "winches: drum_width", width, "m", allowed, step, pitch)
 
 
 def _at(item: str, sample: int, cable: int, samples: int) -> str:

@@ -12,7 +12,7 @@ from attrs import field, fields, frozen
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.core.arguments import instance
-from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
+from sagline.core.arrays import Array, broadcast_shape, checked, locked, number, refuse_first
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, reduced, rule
 from sagline.core.indices import batch_length, part_of
@@ -66,10 +66,7 @@ class PoseBox:
             if corner.ndim != 1:
                 step = "Give one x, y, z."
                 raise InvalidValueError(f"test_box: {name}", f"of shape {corner.shape}", "shape (3,)", step)
-        if (low > high).any():
-            axis = int(np.argmax(low > high))
-            item, allowed = f"test_box: high[{axis}]", f">= low, {low[axis]:g} m"
-            raise InvalidValueError(item, f"{high[axis]:g} m", allowed, "Exchange low and high.")
+        refuse_first(low > high, "test_box: high", high, "m", ">= low, {limit:g} m", "Exchange low and high.", low)
         angle = number(self.tilt, "test_box: tilt", "rad", low=0.0)
         if angle > np.pi:
             value, step = f"{angle:.6g} rad", "Give the angle in radians; the largest rotation is half a turn."
