@@ -102,7 +102,6 @@ class _Episodes:
         return plan.state[places]
 
     def _machine(self, start: Equilibrium) -> Simulator:
-        """Simulated robot at rest."""
         return Simulator(self.robot, start, integrator="splitting", **self._options)
 
     def _events_of(self, rng: np.random.Generator, options: Mapping[str, Any]) -> list[Event]:
@@ -175,7 +174,6 @@ class _Episodes:
 
 
 def _apply(machine: Simulator, event: Event) -> None:
-    """Apply an event to a simulated robot."""
     if isinstance(event, Break):
         machine.cut(event.cable)
     elif isinstance(event, Stall):

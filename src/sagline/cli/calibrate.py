@@ -155,7 +155,6 @@ def calibrate(
 
 
 def _fit(name: str, log: Path | None, given: _Options) -> int:
-    """Calibrate, write and print the result. Returns the exit code."""
     from sagline.calibration import summary
     from sagline.files.log_file import read_log
 
@@ -188,7 +187,6 @@ def _fit(name: str, log: Path | None, given: _Options) -> int:
 
 
 def _plan_poses(name: str, count: int, given: _Options) -> int:
-    """Choose `count` poses, write and print them. Returns the exit code."""
     from sagline.calibration import planning
 
     given.check_files(name, ROBOTS)
@@ -235,7 +233,6 @@ def _written(found: sl.Calibration, wanted: list[Path], given: _Options, line: A
 
 
 def _show_lines(text: Callable[[int], str]) -> None:
-    """Print the lines of `text`, a function of the width of the terminal."""
     from sagline.calibration import summary
 
     show_pieces(lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, summary.WIDTH)).splitlines()])

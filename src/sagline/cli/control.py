@@ -186,7 +186,6 @@ class _TwinMonitor:
 
 
 def _doing(report: sl.twin.Report) -> str:
-    """State of a PLC as text: its status, its fault and the controller that drives it."""
     from sagline.control.link import GroupStatus, fault_text
 
     state = next((words for name, words in STATUS.items() if report.status & GroupStatus[name]), "not ready")

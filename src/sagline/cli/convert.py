@@ -78,7 +78,10 @@ def convert(
         step = f"{KINDS[form].capitalize()} contains no pose. Leave the option out."
         raise sl.InvalidValueError("--at", f"given for {KINDS[form]}", "--kind mjcf", step)
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
-    imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
+    cables = None
+    if linear_density is not None and axial_stiffness is not None:  # one of them alone is rejected
+        cables = sl.Cable(linear_density, axial_stiffness)
+    imported = _read(source, cables, cable_set)
     if form == "robot":
         text = sl.dump_robot(imported.robot)
     elif form == "javascript":
@@ -105,10 +108,6 @@ def _read(source: str, cables: sl.Cable | None, cable_set: str | None) -> sl.Imp
     return sl.Imported(robot if cables is None else robot.replace(cables=cables), ())
 
 
-def _material(density: float | None, stiffness: float | None) -> sl.Cable | None:
-    return None if density is None or stiffness is None else sl.Cable(density, stiffness)
-
-
 def _mjcf(robot: sl.Robot, at: list[float] | None) -> tuple[str, str]:
     """The MuJoCo model of `robot`, and a sentence on the position error that tendons without sag and weight cause."""
     if at is None and robot.test_box is None:
@@ -118,11 +117,8 @@ def _mjcf(robot: sl.Robot, at: list[float] | None) -> tuple[str, str]:
     text = sl.dump_mjcf(robot, pose)
     proof = sl.confirm(sl.inverse(robot, pose, model=sl.Elastic()))
     away = float(np.linalg.norm(proof.position_error))
-    held = (
-        f"hold the platform {n(1e3 * max(away, LEAST), '.2g', 'mm')} away"
-        if proof.held
-        else "do not hold the platform near it"
-    )
+    far = f"hold the platform {n(1e3 * max(away, LEAST), '.2g', 'mm')} away"
+    held = far if proof.held else "do not hold the platform near it"
     return text, f"Sag and weight of the cables: sagging cables of these lengths {held}."
 
 

@@ -69,7 +69,6 @@ def design(
 
 
 def _table(front: sl.Front) -> TextTable:
-    """Table of the first robot and the best robots: values of the goals, then values of the design variables."""
     heads = ["", *(f"{goal.kind}\n[{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
     heads += [f"{part.name}\n[{part.unit}]" if part.unit else part.name for part in front.parts]
     rows = [[front.start.name, *_cells(front.start_values), *_cells([part.start for part in front.parts])]]

@@ -65,7 +65,6 @@ def _finished(command: Callable[[], object]) -> int:
 
 
 def _report(error: BaseException, debug: bool) -> int:
-    """Print the message of an error, and return the exit code."""
     _give_up_unwritable()
     # typer raises another error after a BrokenPipeError
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):

@@ -34,9 +34,8 @@ def examples(folder: Path = opt.out(Path("sagline-examples")), force: bool = opt
     Output(opt.DataFiles(folder, table=False), "", names)  # raises an error if a file cannot be written
     existing = [name for name in names if (folder / name).exists()]
     if existing and not force:
-        raise sl.FileError(
-            folder / existing[0], "exists", "Choose another folder with --out, or replace it with --force."
-        )
+        step = "Choose another folder with --out, or replace it with --force."
+        raise sl.FileError(folder / existing[0], "exists", step)
     create_folder(folder)
     for file in sources:
         with atomic_file(folder / file.name) as partial:
@@ -105,9 +104,8 @@ def _remove(files: list[Path]) -> None:
         try:
             file.unlink(missing_ok=True)
         except OSError as error:
-            raise sl.FileError(
-                file, f"cannot be removed ({error.strerror})", "Check the permissions of its folder."
-            ) from None
+            step = "Check the permissions of its folder."
+            raise sl.FileError(file, f"cannot be removed ({error.strerror})", step) from None
     for folder in {file.parent for file in files}:
         with suppress(OSError):  # another process has written a file into the folder
             folder.rmdir()

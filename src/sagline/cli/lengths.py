@@ -89,11 +89,8 @@ def _write_rows(plan: sl.Plan, name: str, rows: Sequence[Sequence[float]], out: 
     write_or_show(text, out)
     if kept.all():
         return 0
-    show_note(
-        "Left out: ",
-        f"{np.sum(~kept):,} of {kept.size:,} samples, which are not feasible or not stable",
-        style="bold red",
-    )
+    missing = f"{np.sum(~kept):,} of {kept.size:,} samples, which are not feasible or not stable"
+    show_note("Left out: ", missing, style="bold red")
     return OUTSIDE
 
 
@@ -150,9 +147,7 @@ def forward(
         found = sl.forward(robot, lengths, start, model, wrench, progress=line.progress)
     rows = _rows(times, found)
     output.table(table, lambda: rows)
-    lost = [
-        k for k, status in enumerate(found.status) if status not in (sl.ForwardStatus.SOLVED, sl.ForwardStatus.FITTED)
-    ]
+    lost = np.flatnonzero(~np.isin(found.status, (sl.ForwardStatus.SOLVED, sl.ForwardStatus.FITTED))).tolist()
     if files.as_json:
         header = [str(cell).split(" ")[0] for cell in rows[0]]
         file_of_poses = output.files[0] if output.files else None
@@ -167,9 +162,8 @@ def forward(
     if not lost:
         return 0
     status = sl.ForwardStatus(int(found.status[lost[0]]))
-    show_note(
-        f"{len(lost)} of {len(found.status)} samples, the first in row {lost[0] + 1}: ", status.text, style="bold red"
-    )
+    head = f"{len(lost)} of {len(found.status)} samples, the first in row {lost[0] + 1}: "
+    show_note(head, status.text, style="bold red")
     return OUTSIDE
 
 

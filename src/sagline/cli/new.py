@@ -74,7 +74,10 @@ def new(
     """
     from sagline.files.robot_file import parse_robot
 
-    _check_file(file, force=force)
+    if file.suffix not in (".yaml", ".yml"):
+        raise sl.FileError(file, "is not a valid name for a robot file", "Let it end in .yaml.")
+    if file.exists() and not force:
+        raise sl.FileError(file, "exists", "Choose another name, or replace it with --force.")
     design, said = _answered(file.stem, asdict(answers))
     with working(f"checking {prod(GRID)} poses of each of a few boxes"):
         robot, middle = _boxed(design)
@@ -96,13 +99,6 @@ def new(
     if not look:
         return 0
     return view_robot(made, file, opt.with_defaults(ServerOptions))
-
-
-def _check_file(file: Path, *, force: bool) -> None:
-    if file.suffix not in (".yaml", ".yml"):
-        raise sl.FileError(file, "is not a valid name for a robot file", "Let it end in .yaml.")
-    if file.exists() and not force:
-        raise sl.FileError(file, "exists", "Choose another name, or replace it with --force.")
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:

@@ -133,7 +133,7 @@ def converted(
         return getattr(values, function)(value, parameter.opts[-1], **limits)
 
     # the callback converts the text, because typer would change the message of an error that the parser raises
-    return option(default, metavar, text, *more, parser=_unchanged, callback=convert)
+    return option(default, metavar, text, *more, parser=lambda given: given, callback=convert)
 
 
 def quantity(default: T, metavar: str, text: str, unit: str, *more: str | Condition, **limits: float) -> T:
@@ -168,10 +168,6 @@ def _with(declared: T, conditions: Sequence[Condition]) -> T:
     """An option or argument of typer, with the conditions that `main` reads."""
     cast(Any, declared).conditions = conditions
     return declared
-
-
-def _unchanged(value: Any) -> Any:
-    return value
 
 
 def whole_of(text: str, item: str, least: int, most: int) -> int:

@@ -161,7 +161,6 @@ class Output:
             check_files(self.folder, map(self._name, whole))
 
     def _name(self, part: str) -> str:
-        """Name of a file."""
         return self._main.get(part, f"{self._stem}{part}")
 
     def file(self, part: str) -> Path:

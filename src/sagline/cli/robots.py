@@ -162,12 +162,7 @@ def _value(robot: sl.Robot, field: str) -> Any:
     return getattr(robot.cables if field in MATERIAL else robot, field)
 
 
-def _assumption(robot: sl.Robot, field: str) -> str | None:
-    return robot.assumed.get("cables" if field in MATERIAL else field)
-
-
 def _record(robot: sl.Robot) -> dict[str, Any]:
-    """All values of `robot` with their units."""
     from sagline.core.fields import units
     from sagline.robot.tolerances import UNCERTAIN
 
@@ -177,7 +172,8 @@ def _record(robot: sl.Robot) -> dict[str, Any]:
         if field == "test_box" and value is not None:
             value = {"low": value.low, "high": value.high, "tilt_rad": value.tilt}
         record[field] = {"value": value, "unit": unit}
-        if (why := _assumption(robot, field)) is not None and value is not None:
+        why = robot.assumed.get("cables" if field in MATERIAL else field)
+        if why is not None and value is not None:
             record[field]["assumed"] = why
     record["winches"] = None
     if robot.winches is not None:

@@ -185,7 +185,6 @@ class OperatorSession:
         self._ended = True
 
     def _disconnect(self) -> None:
-        """Stop the motion and disconnect."""
         control = self.control
         control.stop()
         while control.moving:
@@ -261,7 +260,6 @@ class OperatorSession:
 
     @property
     def _status(self) -> str:
-        """Text of the status line."""
         control, sample = self.control, self.control.sample
         parts = [control.state.name + " (degraded)" * control.degraded]
         if control.homed:

@@ -62,7 +62,6 @@ def share(
 
 
 def _found(source: Path) -> sl.Robot | SharedMotion:
-    """The robot or the run in `source`."""
     from sagline.files.calibration_file import FORMAT as CALIBRATION
     from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT as SIMULATION
@@ -102,7 +101,6 @@ def _free(file: Path) -> Path:
 
     check_file(file)
     if file.exists() and MADE.encode() not in file.read_bytes()[:HEAD]:
-        raise sl.FileError(
-            file, "exists, and is not a page of sagline", "Give a name of the page with --out; it may be this name."
-        )
+        step = "Give a name of the page with --out; it may be this name."
+        raise sl.FileError(file, "exists, and is not a page of sagline", step)
     return file

@@ -84,7 +84,8 @@ def simulate(
     method, anchors = opt.tension_named(tension), anchors_of(robot, bases)
     with working(f"{robot.name}: simulating") as line:
         start = _start(robot, way, pose, method, shaper, cable_mass, wrench, anchors, line)
-        end = after if way is None else _duration(start) + after
+        course = getattr(start, "path", None)
+        end = after if course is None else course.duration + after
         line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass)}")
         if events and loss_time is None:
             given = initial_conditions(start, None, None, end)
@@ -135,9 +136,8 @@ def _start(
         plan = sl.inverse(robot, place, tension=method, wrench=load)
         if not plan.feasible:
             text, _, why = reason(robot, place, plan).partition(". ")
-            raise sl.InvalidValueError(
-                "--pose", f"infeasible ({why or text})", "a feasible pose", "Change it, or the load."
-            )
+            value = f"infeasible ({why or text})"
+            raise sl.InvalidValueError("--pose", value, "a feasible pose", "Change it, or the load.")
         return plan.state
     if shaper != "none":
         state = sl.inverse(robot, way.pose[len(way) - 1], wrench=load).state
@@ -150,11 +150,6 @@ def _start(
         way = sl.shaped(way, {"zv": sl.ZV, "zvd": sl.ZVD, "ei": sl.EI}[shaper](frequency))
     progress = line.stage(f"{robot.name}: planning")
     return sl.inverse(robot, way, tension=method, wrench=load, anchors=anchors, progress=progress)
-
-
-def _duration(start: sl.Plan | sl.Equilibrium) -> float:
-    path = getattr(start, "path", None)
-    return 0.0 if path is None else float(path.time[-1] - path.time[0])
 
 
 def _verdict(simulation: sl.Simulation, summary: Summary) -> str:

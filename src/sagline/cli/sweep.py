@@ -87,7 +87,6 @@ def sweep(
 
 
 def _again(file: Path, folder: Path, workers: str | None, scheduler: str | None) -> str:
-    """The command that continues the sweep."""
     words = ["sagline", "sweep", str(file), "--out", str(folder)]
     words += ["--workers", workers] if workers is not None else []
     words += ["--scheduler", scheduler] if scheduler is not None else []

@@ -137,7 +137,6 @@ def show_data(text: str) -> None:
 
 
 def _fits(character: str) -> bool:
-    """True if stdout can encode a character."""
     try:
         character.encode(_encoding())
     except UnicodeEncodeError:
@@ -176,9 +175,8 @@ def _refused() -> Iterator[None]:
 def unwritable(error: OSError) -> FileError:
     """FileError for a stdout that cannot be written."""
     reason = "it is closed" if error.errno == errno.EBADF else error.strerror or error
-    return FileError(
-        "standard output", f"cannot be written ({reason})", "Give it a file with space, a pipe or a terminal."
-    )
+    step = "Give it a file with space, a pipe or a terminal."
+    return FileError("standard output", f"cannot be written ({reason})", step)
 
 
 def _encoding() -> str:

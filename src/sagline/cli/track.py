@@ -83,10 +83,9 @@ def load_path_near(robot: sl.Robot, file: Path) -> sl.Path:
     away = np.linalg.norm(way.pose.position - robot.frame_anchors.mean(axis=0), axis=1)
     k = int(np.argmax(away))
     if away[k] > TOO_FAR * size:
-        reason = (
-            f"leads {away[k]:.4g} m away from {robot.name}, whose frame measures {size:.3g} m, at {way.time[k]:g} s"
-        )
-        raise sl.FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
+        far = f"leads {away[k]:.4g} m away from {robot.name}, whose frame measures {size:.3g} m"
+        step = "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML."
+        raise sl.FileError(file, f"{far}, at {way.time[k]:g} s", step)
     return way
 
 
@@ -227,7 +226,6 @@ def tell(runs: Sequence[ConfirmedRun], output: Output, notes: Sequence[str] = ()
 
 
 def _verdict(runs: Sequence[ConfirmedRun]) -> str:
-    """Sentence with the number of feasible and stable poses of all `runs`."""
     poses = sum(run.plan.status.size for run in runs)
     held = sum(int(np.sum(run.plan.feasible)) - run.lost for run in runs)
     of = "" if len(runs) == 1 else f" of {len(runs)} runs"
@@ -293,11 +291,11 @@ def _record(run: ConfirmedRun) -> dict[str, Any]:
 
 
 def _errors(found: sl.Uncertainty) -> dict[str, Any]:
-    """Largest expected errors of the solved poses for JSON."""
-    largest = (_range(each)[1] for each in (1e3 * found.position, found.rotation, found.tension))
-    return dict(
-        zip(("expected_error_max_mm", "expected_rotation_max_rad", "expected_tension_max_n"), largest, strict=True)
-    )
+    return {
+        "expected_error_max_mm": _range(1e3 * found.position)[1],
+        "expected_rotation_max_rad": _range(found.rotation)[1],
+        "expected_tension_max_n": _range(found.tension)[1],
+    }
 
 
 def _range(values: Array) -> tuple[float, float]:

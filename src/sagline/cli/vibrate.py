@@ -110,7 +110,6 @@ def vibrate(
 
 
 def _draw(found: sl.Vibration, axis: str, film: int | None, output: Output, line: ProgressLine) -> None:
-    """Draw the response of a stable equilibrium with modes, and the animation of the mode `film`."""
     if found.status is sl.VibrationStatus.SOLVED and found.frequency.size:
         line.stage("drawing the response")
         output.draw(lambda: sl.plot.response(found, axis))
@@ -127,7 +126,6 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
 
 
 def _verdict(found: sl.Vibration, modes: list[ListedMode]) -> str:
-    """Number of modes with cable mass, and the lowest one."""
     from sagline.dynamics.vibration.vibration import WITH_MASS
 
     frequency = [mode.frequency for mode in modes if mode.kind == WITH_MASS]
@@ -200,7 +198,6 @@ def _record(found: sl.Vibration, modes: list[ListedMode]) -> dict[str, Any]:
 def _vibrate_in_box(
     robot: sl.Robot, points: Sequence[int], limit: float, damping: sl.Damping, method: sl.TensionMethod, output: Output
 ) -> int:
-    """Compute, write and draw the maps over the test box. Returns the exit code."""
     from sagline.robot.pose import level_grid
 
     if robot.test_box is None:

@@ -105,9 +105,8 @@ def view(
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode, "--given": given}
     own = [item for item, value in alone.items() if value is not None]
     if (run is not None or log is not None or found is not None) and own:
-        raise sl.InvalidValueError(
-            own[0], "given with a run", "a robot alone", "A run has its own values: leave one out."
-        )
+        step = "A run has its own values: leave one out."
+        raise sl.InvalidValueError(own[0], "given with a run", "a robot alone", step)
     if beside is not None and (found is not None or (run is None and log is None)):
         step = "Give both: sagline view cogiro run_a.nc --beside run_b.nc"
         raise sl.InvalidValueError("--beside", "given without a run", "two runs of one robot", step)
@@ -136,7 +135,6 @@ def view_robot(
 
 
 def _view_run(robot: sl.Robot, file: Path, address: ServerOptions, beside: Path | None = None) -> int:
-    """Serve the page of a run or simulation until Ctrl-C, with a second run `beside`. Returns the exit code."""
     Source = _viewer()
     from sagline.viewer.playback import PlayedSimulation
 
@@ -147,7 +145,6 @@ def _view_run(robot: sl.Robot, file: Path, address: ServerOptions, beside: Path 
 
 
 def _view_calibration(file: Path, robot: str | None, address: ServerOptions) -> int:
-    """Serve the page of a calibration and its robot until Ctrl-C. Returns the exit code."""
     Source = _viewer()
     found = sl.load_calibration(file)
     if robot is not None:

@@ -153,7 +153,6 @@ def workspace(
 
 
 def _write(space: sl.Workspace, output: Output, line: ProgressLine) -> None:
-    """Write the workspace, its hull, its figures and the table of its limits."""
     space.save(output.file("-workspace.nc"))
     if space.nearest is None:
         space.surface.export(output.file("-hull.glb"))

@@ -197,9 +197,8 @@ def callback(value: Any, item: str) -> Any:
     """Check that the callback `value` is a function or None."""
     if value is None or (callable(value) and not isinstance(value, type)):
         return value
-    raise InvalidValueError(
-        item, brief(value), "a function of two numbers: completed steps and all steps", "Give such a function, or None."
-    )
+    allowed = "a function of two numbers: completed steps and all steps"
+    raise InvalidValueError(item, brief(value), allowed, "Give such a function, or None.")
 
 
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:

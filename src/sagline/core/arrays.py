@@ -5,6 +5,7 @@ All arrays for kernels have the same memory layout, because a kernel is compiled
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from decimal import Decimal
 from numbers import Real
 from typing import Any, Final, TypeGuard
@@ -16,6 +17,7 @@ from sagline.core.arguments import brief
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 
+AnyArray = NDArray[Any]
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 Indices = NDArray[np.int64]
@@ -128,6 +130,22 @@ def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
         raise InvalidValueError(item, f"not of one shape, but {listed}", "shapes that broadcast", step) from None
 
 
+def leaves(value: Any) -> Iterator[Any]:
+    """Arrays and numbers of nested tuples, in order. None is omitted, because None is not an argument in C."""
+    if isinstance(value, tuple):
+        for each in value:
+            yield from leaves(each)
+    elif value is not None:
+        yield value
+
+
+def owner(array: AnyArray) -> AnyArray:
+    """The array that owns the memory of a view."""
+    while isinstance(array.base, np.ndarray):
+        array = array.base
+    return array
+
+
 def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
     """True if `value` and the array that owns its memory are read-only, C-contiguous float64 arrays."""
     if not (type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous):
@@ -168,7 +186,6 @@ def _from_other_kind(given: NDArray[Any], item: str) -> Array:
 
 
 def _listed(value: object) -> str:
-    """Text of a value that is not a number, for a message."""
     return brief(value.item() if isinstance(value, np.ndarray) and value.size == 1 else value)
 
 

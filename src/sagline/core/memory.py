@@ -30,9 +30,8 @@ def check_memory(item: str, size: float, next_step: str) -> None:
 def check_poses(count: int, cable_count: int, behind: bool) -> None:
     """Refuse kinematics of `count` poses that need too much memory; behind: True with pulleys or dead lengths."""
     cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
-    check_memory(
-        f"a batch of {count:,} poses", count * (_POSE_BYTES + cable * cable_count), "Solve the batch in parts."
-    )
+    size = count * (_POSE_BYTES + cable * cable_count)
+    check_memory(f"a batch of {count:,} poses", size, "Solve the batch in parts.")
 
 
 def free_memory() -> float:

@@ -122,9 +122,8 @@ def source_of(
     words["forward"] = filled("c/forward.h", words) if forward else ""
     functions = ["c/inverse.c", *(["c/forward.c"] if forward else [])]
     body = "".join(filled(name, words) for name in functions)
-    return f"{filled('c/head.c', words)}{reached_parts(kernels[words['real']], asked)}\n{body}", filled(
-        "c/sagline.h", words
-    )
+    source = f"{filled('c/head.c', words)}{reached_parts(kernels[words['real']], asked)}\n{body}"
+    return source, filled("c/sagline.h", words)
 
 
 def translated_kernels() -> dict[str, Any]:
@@ -203,7 +202,6 @@ def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
 
 
 def _rule(options: Options, real: type[np.floating]) -> str:
-    """Data of a tension distribution method as C text."""
     code, parameter, variable, weights, targets = options.sharing
     numbers = (constant_text(np.asarray(value), "tension", real) for value in (parameter, options.limits[1]))
     lists = (constant_text(np.asarray(value), "tension", real) for value in (weights, targets))
@@ -211,7 +209,6 @@ def _rule(options: Options, real: type[np.floating]) -> str:
 
 
 def _statuses() -> str:
-    """Lines of the C enumeration of statuses: each status with its meaning."""
     rows = [(status.name, int(status), status.text) for status in PoseStatus if int(status) < BAD_INPUT]
     rows.append(("BAD_INPUT", BAD_INPUT, "a number is not finite, a length too short, a quaternion not of length 1"))
     forward = [(f"FORWARD_{each.name}", FORWARD_STATUS + int(each), each.text) for each in ForwardStatus]
@@ -229,10 +226,8 @@ def constant_text(values: Array, name: str, real: type[np.floating]) -> str:
     if np.isnan(values) or np.isinf(values):
         return "NAN" if np.isnan(values) else "INFINITY" if number > 0.0 else "-INFINITY"
     if not np.isfinite(number) or (number == 0.0) != (values == 0.0):
-        step = "Export it in double precision."
-        raise InvalidValueError(
-            name, f"{float(values):g}", f"{np.finfo(real).tiny:.0e} to {np.finfo(real).max:.0e}", step
-        )
+        allowed = f"{np.finfo(real).tiny:.0e} to {np.finfo(real).max:.0e}"
+        raise InvalidValueError(name, f"{float(values):g}", allowed, "Export it in double precision.")
     return f"{number!s}{'F' if real is np.float32 else ''}"
 
 
@@ -319,11 +314,8 @@ def _field(field: Field, indent: str) -> list[str]:
     if isinstance(kind, str):
         return [f"{indent}{field.name} : {kind};".ljust(40) + f"// {field.offset}: {field.meaning}"]
     inside = [line for each in kind for line in _field(each, indent + "   ")]
-    begin = (
-        f"{indent}{field.name} : Array[1..{link.GROUP_SIZE}] of Struct".ljust(40)
-        + f"// {field.offset}: {field.meaning}"
-    )
-    return [begin, *inside, f"{indent}END_STRUCT;"]
+    begin = f"{indent}{field.name} : Array[1..{link.GROUP_SIZE}] of Struct".ljust(40)
+    return [f"{begin}// {field.offset}: {field.meaning}", *inside, f"{indent}END_STRUCT;"]
 
 
 def _row(name: str, values: list[float]) -> str:
@@ -340,9 +332,8 @@ def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: st
     """Check the path `file` of a source file; raise FileError if its suffix is not `ending`."""
     path = file_path(file)
     if path.suffix != ending:
-        raise FileError(
-            path, f"is not a valid name for {what}", f"Let it end in {ending}: {path.stem or usual}{ending}."
-        )
+        step = f"Let it end in {ending}: {path.stem or usual}{ending}."
+        raise FileError(path, f"is not a valid name for {what}", step)
     return path
 
 

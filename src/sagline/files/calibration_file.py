@@ -208,7 +208,6 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
 
 
 def _pack(found: Calibration) -> Dataset:
-    """Create the data set of a calibration."""
     variables = v.variables_of_result(found, FOUND) | v.variables_of_result(found.parameters, PARAMETERS)
     dimensions, units, attributes = variables["parameter_unit"]
     variables["parameter_unit"] = dimensions, np.where(units == "", "1", units).astype(object), attributes
@@ -243,7 +242,6 @@ def _sensor(name: str, axes: int) -> Quantity:
 
 
 def _unpack(path: Path, data: Dataset) -> Calibration:
-    """Create the calibration from a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
     measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # this one always exists

@@ -96,9 +96,8 @@ def _files(source: Path) -> tuple[Path, Path]:
     folder = folder.parent if folder.name == "cables" else folder
     beside = sorted((*folder.glob("*.xml"), *folder.glob("cables/*.xml")))
     if not source.is_dir() and _kind(xml.read_xml(source)) is None:
-        raise FileError(
-            source, "contains neither <link_rigid> nor <cables>", "Check that this is the CASPR file you mean."
-        )
+        step = "Check that this is the CASPR file you mean."
+        raise FileError(source, "contains neither <link_rigid> nor <cables>", step)
     found: dict[str, list[Path]] = {"bodies": [], "cables": []}
     for file in beside if source.is_dir() else [source, *beside]:
         kind = _kind(xml.read_xml(file))
@@ -132,9 +131,8 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
     center = xml.numbers_of_text(physical.findtext("com_location"), 3, "com_location", "m")
     inertia = _inertia(xml.only_child(physical, "inertia", "physical"), mass, center)
     fields: dict[str, Any] = {"mass": mass, "inertia": inertia, "center_of_mass": center}
-    return fields | dict(zip(("motion_pattern", "plane_normal"), _JOINTS[joint], strict=True)), _lost_of_link(
-        root, link
-    )
+    fields["motion_pattern"], fields["plane_normal"] = _JOINTS[joint]
+    return fields, _lost_of_link(root, link)
 
 
 def _inertia(element: Element, mass: float, center: Array) -> Array:

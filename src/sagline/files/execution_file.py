@@ -66,7 +66,6 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
 
 
 def _execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
-    """Create the execution from the content of a log."""
     count = len(log.plans)
     chosen = None if plan is None else integer(plan)
     if plan is not None and (chosen is None or not -count <= chosen < count):

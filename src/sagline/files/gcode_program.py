@@ -119,7 +119,6 @@ class _Program:
         return self._execute(_WORD.findall(text))
 
     def _refuse_text(self, text: str) -> NoReturn:
-        """Refuse a line that does not consist of words."""
         match = _WORDS.match(text)
         rest = printable(text[match.end() if match else 0 :][:20])
         if rest[0] in "()":
@@ -182,7 +181,6 @@ class _Program:
         return not ends
 
     def _set_modes(self, modes: dict[str, float], words: dict[str, float]) -> None:
-        """Set the modal state of a line."""
         if "units" in modes:
             self.unit = 25.4e-3 if modes["units"] == 20 else 1e-3
         if "feed" in modes and self.inverse_time != (modes["feed"] == 93):

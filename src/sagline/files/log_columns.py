@@ -155,9 +155,7 @@ def _read_arrays(path: Path) -> _Source:
     for name, array in arrays.items():
         values = np.asarray(array)
         if values.dtype.kind in "biuf" and values.ndim in (1, 2):
-            matrix = (
-                values.reshape(len(values), -1) if values.ndim == 2 and 1 not in values.shape else values.reshape(-1, 1)
-            )
+            matrix = values if values.ndim == 2 and 1 not in values.shape else values.reshape(-1, 1)
             for k, column in enumerate(matrix.T.astype(float).tolist()):
                 cells[f"{name}[{k}]" if matrix.shape[1] > 1 else name] = ["" if x != x else repr(x) for x in column]
     if not cells:
@@ -185,9 +183,8 @@ def _one_row_per_pose(path: Path, source: _Source, columns: Mapping[str, ColumnE
     names = [columns[name].name for name in ("cable", key)]
     for name in names:
         if name not in source.cells:
-            raise FileError(
-                path, f"has no column {name!r}", f"The file has: {', '.join(source.cells)}.", item="columns"
-            )
+            step = f"The file has: {', '.join(source.cells)}."
+            raise FileError(path, f"has no column {name!r}", step, item="columns")
     poses: dict[str, dict[int, int]] = {}  # for each pose: row of each cable
     for row, (cable, pose) in enumerate(zip(*(source.cells[name] for name in names), strict=True)):
         number = plain_number(cable)

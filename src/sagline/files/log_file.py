@@ -145,7 +145,6 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
 
 
 def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
-    """Fields of the log, without its sensors."""
     return {
         "counts": _stack_columns(table, names_of_cables("count", cables)),
         "unstrained_length": _stack_columns(table, names_of_cables("length", cables)),

@@ -156,7 +156,6 @@ class LogReader:
             self._take_chunk(_content_of(found))
 
     def _take_chunk(self, data: bytes) -> None:
-        """Store the channels and messages of a chunk."""
         from mcap.data_stream import ReadDataStream
         from mcap.records import Channel
 

@@ -324,7 +324,6 @@ class Recorder:
         self._plan = NONE
 
     def _close_block(self) -> None:
-        """Write the collected cycles to the log."""
         if not len(self._tape):
             return
         none = ExecutionStatus.UNKNOWN

@@ -61,9 +61,8 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     data = read_bytes(path, LIMIT)
     vertices, faces = _triangles(path, data, factor)
     if len(faces) > MOST:
-        raise FileError(
-            path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify the mesh in the program that made it."
-        )
+        step = "Simplify the mesh in the program that made it."
+        raise FileError(path, f"has {len(faces):,} triangles; allowed: {MOST:,}", step)
     with value_errors(path):
         mesh = Mesh(vertices, faces, called)
     if len(faces) <= CHECKED and (crossing := _first_crossing(mesh)) is not None:

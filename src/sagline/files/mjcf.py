@@ -78,7 +78,6 @@ def _lead_of(robot: Robot, pose: Pose) -> tuple[Array, Array, Array]:
 
 
 def _add_pulleys(world: Element, robot: Robot, pose: Pose, side: Array) -> None:
-    """Add the pulleys, each as a separate fixed body."""
     radius = pulleys_of(robot).radius
     toward, centers = outward(robot, pose), pulley_centers(robot, pose)
     for i in np.flatnonzero(radius > 0.0):
@@ -202,12 +201,9 @@ def step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float,
 def _lengths_at_rest(robot: Robot, pose: Pose) -> Array:
     plan = inverse(robot, pose, model=Elastic())
     if not plan.solved:
-        raise InvalidValueError(
-            f"{robot.name} at ({', '.join(f'{x:g}' for x in pose.position)}) m",
-            PoseStatus(int(plan.status)).text,
-            "a pose that straight elastic cables can hold",
-            "Give another pose, or the cables' lengths.",
-        )
+        place = f"{robot.name} at ({', '.join(f'{x:g}' for x in pose.position)}) m"
+        allowed, step = "a pose that straight elastic cables can hold", "Give another pose, or the cables' lengths."
+        raise InvalidValueError(place, PoseStatus(int(plan.status)).text, allowed, step)
     return plan.unstrained_length
 
 
@@ -215,12 +211,8 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
     """Unstrained lengths (m,) off the drum [m], each longer than its dead length."""
     array = checked(lengths, "unstrained_length", "m", low=_SHORTEST)
     if array.shape != (robot.cable_count,):
-        raise InvalidValueError(
-            "unstrained_length",
-            f"of shape {array.shape}",
-            f"shape ({robot.cable_count},)",
-            "Give one length per cable.",
-        )
+        allowed, step = f"shape ({robot.cable_count},)", "Give one length per cable."
+        raise InvalidValueError("unstrained_length", f"of shape {array.shape}", allowed, step)
     dead = dead_cable(robot)
     if ((array <= dead) & (dead > 0.0)).any():
         raise dead_only(array, dead)

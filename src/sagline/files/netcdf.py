@@ -275,15 +275,12 @@ def choice_of(
     choice: Any = choices[name]
     given = {field.name: attributes.get(f"{key}_{field.name}") for field in fields(choice)}
     try:
-        options = {option: _plain(value) for option, value in given.items() if value is not None}
+        plain = {option: value.item() if isinstance(value, np.generic) else value for option, value in given.items()}
+        options = {option: value for option, value in plain.items() if value is not None}
         found: Choice = choice(**{**options, **known})
     except TypeError as error:  # the cause is, for example, a text in place of a number
         raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
     return found
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:

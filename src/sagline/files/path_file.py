@@ -39,7 +39,6 @@ PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
 def _path_from_table(path: FilePath, text: str) -> Path:
-    """Read the path of a CSV text."""
     table = CsvTable.read(path, text, UNITS)
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
@@ -67,11 +66,8 @@ def _check_columns(table: CsvTable) -> None:
     wanted = PLACE + next((way for way in (EULER, QUATERNION) if orientation & set(way)), ())
     table.check_columns(wanted, f"; found: {', '.join(table.columns)}")
     if surplus := table.columns.keys() - set(wanted):
-        raise line_error(
-            table.path,
-            table.header,
-            f"columns {', '.join(sorted(surplus))} beside {', '.join(EULER)}; allowed: one way",
-        )
+        reason = f"columns {', '.join(sorted(surplus))} beside {', '.join(EULER)}; allowed: one way"
+        raise line_error(table.path, table.header, reason)
 
 
 def load_path(file: str | os.PathLike[str]) -> Path:
@@ -198,7 +194,6 @@ def _durations(poses: Pose) -> list[float]:
 
 
 def _about(plan: CalibrationPoses) -> dict[str, Any]:
-    """Header entry of the file: robot, version of sagline, and purpose of the poses."""
     numbers = plan.parameters
     given = {name: getattr(plan.sensors, name) for name in units(type(plan.sensors))}
     errors = {

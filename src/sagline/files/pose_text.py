@@ -75,18 +75,13 @@ class PoseEntry(YamlEntry):
             angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
             return Pose.from_euler(position, *_si_numbers(angles, 3, "rad", f"{item}.euler"))
         if self.euler is not None:
-            raise InvalidValueError(
-                item, "given with euler and quaternion", "one of the two, or none", "Leave one of them out."
-            )
+            value, step = "given with euler and quaternion", "Leave one of them out."
+            raise InvalidValueError(item, value, "one of the two, or none", step)
         quaternion = _si_numbers(self.quaternion, 4, "", f"{item}.quaternion")
         length = float(np.linalg.norm(quaternion))
         if abs(length - 1.0) > QUATERNION_TOLERANCE:
-            raise InvalidValueError(
-                f"the length of {item}.quaternion",
-                f"{length:.6g}",
-                f"1 to {QUATERNION_TOLERANCE:g}",
-                f"Correct {item}.",
-            )
+            wrong, allowed = f"the length of {item}.quaternion", f"1 to {QUATERNION_TOLERANCE:g}"
+            raise InvalidValueError(wrong, f"{length:.6g}", allowed, f"Correct {item}.")
         return Pose.from_quaternion(position, quaternion / length)
 
 

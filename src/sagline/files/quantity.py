@@ -56,7 +56,8 @@ def in_si(value: object, unit: str, item: str) -> Nested:
         return [in_si(element, unit, f"{item}[{i}]") for i, element in enumerate(value)]
     number = _from_text(value, unit) if isinstance(value, str) else _from_number(value)
     if number is None or isnan(number):
-        raise _no_quantity(value, unit, item)
+        wanted = f'a number in {unit}, or text with a unit that converts to it, such as "1.5 {unit}"'
+        raise InvalidValueError(item, reprlib.repr(value), wanted if unit else "a number", f"Correct {item}.")
     if not (isinf(number) or within_reach(number)):
         raise InvalidValueError(item, reprlib.repr(value), f"{REACH} {unit}".rstrip(), f"Correct {item}.")
     return number
@@ -108,10 +109,3 @@ def _registry() -> UnitRegistry[Any]:
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)
-
-
-def _no_quantity(value: object, unit: str, item: str) -> InvalidValueError:
-    allowed = (
-        f'a number in {unit}, or text with a unit that converts to it, such as "1.5 {unit}"' if unit else "a number"
-    )
-    return InvalidValueError(item, reprlib.repr(value), allowed, f"Correct {item}.")

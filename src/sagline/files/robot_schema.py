@@ -106,12 +106,8 @@ class _RobotPart(YamlEntry):
         for way in ways:
             if found == set(way):
                 return way
-        raise InvalidValueError(
-            item,
-            "given by " + (" and ".join(sorted(found)) or "nothing"),
-            "; or ".join(" and ".join(way) for way in ways),
-            "Give exactly one of these.",
-        )
+        given, allowed = " and ".join(sorted(found)) or "nothing", "; or ".join(" and ".join(way) for way in ways)
+        raise InvalidValueError(item, f"given by {given}", allowed, "Give exactly one of these.")
 
 
 class _Cables(_RobotPart):
@@ -164,12 +160,8 @@ def _vectors(value: object) -> object:
         return value
     if value not in SWIVEL_AXES:
         allowed = f"{', '.join(SWIVEL_AXES)}, or a vector of three numbers"
-        raise InvalidValueError(
-            "winches.swivel_axis",
-            reprlib.repr(value),
-            allowed,
-            "Give the direction in which the cable enters the pulley.",
-        )
+        step = "Give the direction in which the cable enters the pulley."
+        raise InvalidValueError("winches.swivel_axis", reprlib.repr(value), allowed, step)
     return SWIVEL_AXES[value]
 
 

@@ -71,9 +71,8 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
     """Find the element with the tag `tag` inside the element `parent`."""
     found = parent.findall(tag)
     if len(found) != 1:
-        raise InvalidValueError(
-            f"{item}: number of <{tag}>", len(found), "1", f"Check that the file is complete, then correct {item}."
-        )
+        step = f"Check that the file is complete, then correct {item}."
+        raise InvalidValueError(f"{item}: number of <{tag}>", len(found), "1", step)
     return found[0]
 
 
@@ -103,9 +102,8 @@ def _cause(error: Exception, data: bytes) -> tuple[str, str]:
         if not data.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<"):
             return "is not an XML file", "Check that this is the file you mean."
         if not _decodes(data, encoding):
-            return f"is not {encoding} text, as an XML file that says {'so' if declared else 'nothing'} must be", (
-                "Save it as UTF-8."
-            )
+            said = "so" if declared else "nothing"
+            return f"is not {encoding} text, as an XML file that says {said} must be", "Save it as UTF-8."
     if getattr(error, "code", None) in _CUT_OFF:
         return f"is not complete XML ({error})", "Check that this is the file you mean; it may have been cut off."
     return f"is not complete XML ({error})", "Check that this is the file you mean, and correct it there."

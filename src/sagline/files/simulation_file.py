@@ -106,12 +106,10 @@ def _event_variables(data: Dataset) -> list[Quantity]:
 
 
 def _has_events(data: Dataset) -> bool:
-    """True if a data set has a variable of events."""
     return any(quantity.name in data.variables for quantity in EVENTS)
 
 
 def _check_settings(attributes: Any) -> None:
-    """Refuse settings of the integration that are unknown or inconsistent."""
     kinds = {"cable_mass": CABLE_MASS, "integrator": INTEGRATORS, "winches": WINCHES, "winding": WINDINGS}
     for name, allowed in kinds.items():
         choice(attributes[name], name, allowed)
@@ -170,7 +168,6 @@ def _check_gaps(name: str, values: Array, gone: Any) -> None:
 
 
 def _check_balance(data: Dataset) -> None:
-    """Refuse an energy error that contradicts the other energies."""
     names = ("kinetic_energy", "potential_energy", "energy_supplied", "energy_lost", "energy_removed", "energy_error")
     kinetic, potential, supplied, lost, removed, error = (data.variables[name].values for name in names)
     total = kinetic + potential - supplied + lost + removed
@@ -233,7 +230,6 @@ def _pack(simulation: Simulation) -> Dataset:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Simulation:
-    """Create a simulation from a data set. Messages contain `path`."""
     robot = robot_of(path, data)
     _check_simulation(data, robot.cable_count)
     attributes, found = data.attrs, v.fields_of(data, (TIME, *SAMPLES, NODES, LARGEST))
@@ -282,7 +278,6 @@ FREQUENCIES: Final = (
 
 
 def _pack_frequencies(found: FrequencyMap) -> Dataset:
-    """Create the data set of a frequency map."""
     attributes = attributes_with_units(found, {"up_to": "Hz"})
     attributes |= attributes_with_units(
         found.damping, {"loss_time": "s", "air_damping": "N s/m2", "modal_damping": None}

@@ -228,10 +228,8 @@ def _check_codes(quantity: Quantity, variable: Variable) -> None:
     theirs = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
     for value in np.unique(variable.values).tolist():
         if value not in ours or theirs.get(value) != ours[value]:
-            said = theirs.get(value, "without a meaning")
-            raise InvalidValueError(
-                quantity.name, f"{value} ({said})", ", ".join(f"{code} ({word})" for code, word in ours.items()), NEWER
-            )
+            said, known = theirs.get(value, "without a meaning"), (f"{code} ({word})" for code, word in ours.items())
+            raise InvalidValueError(quantity.name, f"{value} ({said})", ", ".join(known), NEWER)
 
 
 def _check_texts(quantity: Quantity, variable: Variable) -> None:

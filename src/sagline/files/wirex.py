@@ -24,6 +24,7 @@ from sagline.robot.winch import Winch
 _AXES: Final = ("x", "y", "z")
 _FLATTEST: Final = 0.1  # smallest ratio of two edges of the assumed box, because all anchors may be in a plane
 _VERSIONS: Final = ("0.31", "0.32")
+_SAVE_AGAIN: Final = "Open it in WireCenter and save it again."
 _INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows programs write 1.#INF
 
 
@@ -61,15 +62,11 @@ def _check_generation(root: Element) -> None:
     if root.tag != "models":
         raise InvalidValueError("root element", f"<{root.tag}>", "<models>", "Check that this is a .wcrfx file.")
     if root.find("robot") is None and root.find("wireRobot") is not None:
-        raise InvalidValueError(
-            "robot", "in the old form <wireRobot>", "<robot>", "Open it in WireCenter and save it again."
-        )
+        raise InvalidValueError("robot", "in the old form <wireRobot>", "<robot>", _SAVE_AGAIN)
     version = root.get("version")
     if version not in _VERSIONS:
         shown = "missing" if version is None else repr(version)
-        raise InvalidValueError(
-            "version of the format", shown, " or ".join(_VERSIONS), "Open it in WireCenter and save it again."
-        )
+        raise InvalidValueError("version of the format", shown, " or ".join(_VERSIONS), _SAVE_AGAIN)
 
 
 def _robot(root: Element, name: str, cables: Cable | None) -> Imported:

@@ -181,7 +181,6 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
 
 
 def _pack(space: Workspace) -> Dataset:
-    """Create the data set of a workspace."""
     box = space.box
     attributes = {
         **{"volume": space.volume, "volume_error": space.volume_error, "volume_units": space.unit},
@@ -206,7 +205,6 @@ def _pack(space: Workspace) -> Dataset:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
-    """Create a workspace from a data set. Messages contain `path`."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     if "component_separate" not in data.variables:  # a file of an older version of sagline has no proofs
         data = data.assign(component_separate=("component", np.zeros(data.sizes["component"], dtype=np.bool_)))

@@ -155,10 +155,8 @@ def write_text(file: os.PathLike[str] | str, text: str) -> None:
         content = text.encode()
     except UnicodeEncodeError as error:
         found = f"U+{ord(text[error.start]):04X} in {text[max(0, error.start - 20) : error.start]!r}…"
-        step = "Correct the name or note that contains it."
-        raise FileError(
-            Path(file), f"cannot be written: the text has an incomplete character ({found})", step
-        ) from None
+        reason = f"cannot be written: the text has an incomplete character ({found})"
+        raise FileError(Path(file), reason, "Correct the name or note that contains it.") from None
     with atomic_file(file) as partial:
         partial.write_bytes(content)
 

@@ -15,12 +15,12 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 
 from sagline.core.arguments import choice, instance, whole_number
+from sagline.core.arrays import leaves, owner
 from sagline.core.version import __version__
 from sagline.dynamics.simulation.simulate import Integrator
 from sagline.dynamics.simulation.simulator import KernelArguments, Simulator
 from sagline.dynamics.simulation.winches import Winches
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.files.c_calls import leaves, owner
 from sagline.files.c_source import checked_name, constant_text, filled, origin, reached_parts, translated_kernels
 from sagline.files.compilers import compile_library
 from sagline.files.writing import atomic_file

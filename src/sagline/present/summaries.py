@@ -108,7 +108,6 @@ def _extent(values: NDArray[Any], units: list[str]) -> str:
 
 
 def _place(pose: Pose) -> str:
-    """Position of a single pose as text."""
     return f"({', '.join(n(each, '.4f') for each in pose.position.reshape(-1))})"
 
 

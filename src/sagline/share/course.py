@@ -136,11 +136,8 @@ def _why(gap: Gap) -> str:
     if gap.status is not PoseStatus.INFEASIBLE:
         word = "Unstable" if gap.status is PoseStatus.UNSTABLE else "Not feasible"
         return f"{word}: {gap.status.text.partition(';')[0]}"
-    short = (
-        f"short of up to {n(gap.shortfall, '.3g', 'N')}"
-        if np.isfinite(gap.shortfall)
-        else "no force alone is sufficient"
-    )
+    missing = f"short of up to {n(gap.shortfall, '.3g', 'N')}"
+    short = missing if np.isfinite(gap.shortfall) else "no force alone is sufficient"
     cables = f"; at their limits: cables {', '.join(map(str, gap.cables))}" if gap.cables else ""
     return f"Not feasible: {short}{cables}"
 

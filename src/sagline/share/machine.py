@@ -12,8 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.cables.models import Catenary
-from sagline.core.arrays import Array, locked
-from sagline.files.c_calls import AnyArray
+from sagline.core.arrays import AnyArray, Array, locked
 from sagline.kernels import tables
 from sagline.kernels.cable.batch import cable_courses
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS
@@ -158,7 +157,6 @@ def _highest(robot: Robot) -> float:
 
 
 def _triangles(solid: shapes.Solid, size: float) -> tuple[dict[str, object], str]:
-    """Encoded corners of all triangles."""
     return encode_columns([PackedColumn("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
 
 

@@ -12,9 +12,8 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import AnyArray, Array, leaves, owner
 from sagline.core.errors import FileError
-from sagline.files.c_calls import AnyArray, leaves, owner
 from sagline.files.packed import smallest_differences
 
 Call = tuple[str, tuple[Any, ...]]  # name of the C entry without prefix, and arguments as in Python
