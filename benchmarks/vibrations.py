@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.dynamics.vibration.robot_modes import VibrationModel, modes_below
+from sagline.dynamics.vibration.robot_modes import VibrationModel
 from tests.dynamics.states import at, middle
 from tests.dynamics.vibration.test_vibration import LOWEST_SIX
 from tests.kernels.dynamics.strings import chain, held, string
@@ -44,7 +44,7 @@ def robots() -> Iterator[Row]:
     state = at("cogiro", (0.0, 0.0, 2.0))
     setting, found_all = VibrationModel.of(state), sl.vibration(state, up_to=50.0).frequency
     limits = np.linspace(2.0, 50.0, 49)
-    equal = sum(int((found_all < limit).sum()) == modes_below(setting, 0, limit) for limit in limits)
+    equal = sum(int((found_all < limit).sum()) == setting.modes_below(0, limit) for limit in limits)
     yield Row(
         "cogiro: modes and exact count, 49 frequencies to 50 Hz", "equal", f"{equal} of 49, {found_all.size} modes"
     )

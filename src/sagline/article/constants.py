@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from sagline.article.drawing import (
-    Drawings,
-    axes,
-    chapter,
-    finding,
-    shades,
-)
+from sagline.article.drawing import Drawings, axes, chapter, finding, shades
 from sagline.article.regressions import (
     ANGLE,
     PUBLISHED_K_H,

@@ -11,15 +11,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 import sagline as sl
-from sagline.article.drawing import (
-    Drawings,
-    axes,
-    chapter,
-    draw_errors,
-    finding,
-    logarithmic_with_floor,
-    map_axes,
-)
+from sagline.article.drawing import Drawings, axes, chapter, draw_errors, finding, logarithmic_with_floor, map_axes
 from sagline.article.regressions import GRAVITY, simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n

@@ -15,13 +15,7 @@ from sagline.calibration.candidates import CandidatePoses, candidates_of, shorte
 from sagline.calibration.findings import UNITS
 from sagline.calibration.log import READINGS, Sensors
 from sagline.calibration.observations import MachineTerms, has_drum_data, predicted_rows
-from sagline.calibration.parameters import (
-    DEFAULT,
-    Parameters,
-    Unknown,
-    correlation_root,
-    parameters_of,
-)
+from sagline.calibration.parameters import DEFAULT, Parameters, Unknown, correlation_root, parameters_of
 from sagline.core.arguments import callback, instance, optional, whole_number
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError

@@ -11,12 +11,7 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.calibration.further import FurtherReadings, circular_mean, swivel_angles
 from sagline.calibration.log import Sensors, WinchLog, load_cells_of, measures_yaw
-from sagline.calibration.observations import (
-    NO_LOAD,
-    MachineTerms,
-    WhitenedRows,
-    lengths_at_counts,
-)
+from sagline.calibration.observations import NO_LOAD, MachineTerms, WhitenedRows, lengths_at_counts
 from sagline.calibration.parameters import Parameters, sensors_with, with_values
 from sagline.calibration.straight import lines_at
 from sagline.core.arrays import Array, Flags, locked

@@ -9,9 +9,8 @@ import pytest
 from scipy.integrate import simpson
 
 import sagline as sl
-from sagline.dynamics.vibration import robot_modes
 from sagline.dynamics.vibration.dynamic_stiffness import EXACT, in_world
-from sagline.dynamics.vibration.robot_modes import VibrationModel, _dynamic_matrix, modes_below
+from sagline.dynamics.vibration.robot_modes import VibrationModel, _dynamic_matrix
 from sagline.kernels.dynamics import collocation
 from tests.dynamics.linear_systems import mass_of
 from tests.dynamics.states import at, middle
@@ -43,7 +42,7 @@ def test_every_frequency_by_the_exact_count(name: str) -> None:
     assert found.complete
     for number, frequency in enumerate(found.frequency):
         twins = int((np.abs(found.frequency - frequency) < 2e-5).sum()) - 1
-        below, above = (modes_below(setting, 0, frequency + step) for step in (-1e-5, 1e-5))
+        below, above = (setting.modes_below(0, frequency + step) for step in (-1e-5, 1e-5))
         assert below <= number < above
         assert above - below <= 1 + twins
 
@@ -53,7 +52,7 @@ def test_the_count_at_frequencies_to_fifty_hertz() -> None:
     setting, found = VibrationModel.of(state), sl.vibration(state, up_to=50.0)
     assert found.complete
     for frequency in (2.0, 4.1, 11.3, 20.0, 33.3, 49.9):
-        assert (found.frequency < frequency).sum() == modes_below(setting, 0, frequency)
+        assert (found.frequency < frequency).sum() == setting.modes_below(0, frequency)
 
 
 def test_lowest_twelve_of_cogiro_do_not_depend_on_the_number_of_elements() -> None:
@@ -140,7 +139,7 @@ def test_elastic_cables_without_weight_vibrate() -> None:
     found, setting = sl.vibration(state, up_to=12.0), VibrationModel.of(state)
     assert found.complete
     assert found.count > 16
-    assert modes_below(setting, 0, 12.0) == found.count
+    assert setting.modes_below(0, 12.0) == found.count
 
 
 def test_a_mode_at_the_limit_agrees_with_the_count() -> None:
@@ -226,9 +225,7 @@ def test_too_many_modes_are_counted_and_refused() -> None:
 
 
 def test_modes_and_count_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sagline.dynamics.vibration import robot_modes
-
-    monkeypatch.setattr(robot_modes, "modes_below", lambda *_: 79)
+    monkeypatch.setattr(VibrationModel, "modes_below", lambda *_: 79)
     with pytest.raises(sl.SaglineError, match=r"\b79\b"):
         sl.vibration(middle("cogiro"), up_to=10.0)
 
@@ -252,7 +249,7 @@ def _first_string(state: sl.Equilibrium) -> float:
 
 @pytest.mark.parametrize("name", ["cogiro", "article-suspended"])
 def test_far_too_many_modes_are_refused_before_they_are_counted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot_modes, "modes_below", None)
+    monkeypatch.setattr(VibrationModel, "modes_below", None)
     robot = sl.load_robot(name)
     state = sl.inverse(robot, sl.Pose.from_euler((0.5, 0.3, 2.0), 0.0, 0.0, 0.0)).state
     cables = state.cables

@@ -103,6 +103,26 @@ class ChainPlant(Plant):
     kernel: ClassVar[Any] = staticmethod(run.run_chains)
     cable_mass: ClassVar[str] = "lumped"
 
+    @staticmethod
+    def check(given: InitialConditions) -> None:
+        """Reject initial conditions `given` with cables for which the lumped model is not valid."""
+        if given.model.code != codes.CATENARY:
+            name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
+            raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
+        light = np.flatnonzero(~(given.robot.cables.linear_density > 0.0))
+        if light.size:
+            step = 'Give a density, or cable_mass="none".'
+            raise InvalidValueError(
+                f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m for a cable with mass", step
+            )
+
+    @staticmethod
+    def wave_frequency(given: InitialConditions, nodes: int) -> float:
+        """Highest angular frequency of chains [rad/s], computed for the shortest element that can occur."""
+        material = given.robot.cables
+        element = given.state.free_length / nodes
+        return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())
+
     def __init__(self, given: InitialConditions, data: Array, nodes: int, losses: Damping) -> None:
         """Create the chains of a robot at rest, or in motion at the speed of its path; `data` (DATA_ROWS, m)."""
         state, robot = given.state, given.robot
@@ -297,21 +317,3 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
     table[:, c.WIND], table[:, c.GRAVITY] = data[d.DRAG], given.robot.gravity
     table[:, c.CABLE], table[:, c.POINTS] = np.arange(len(table)), nodes + 1
     return table
-
-
-def check_lumped(given: InitialConditions) -> None:
-    """Reject initial conditions `given` with cables for which the lumped model is not valid."""
-    if given.model.code != codes.CATENARY:
-        name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
-        raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
-    light = np.flatnonzero(~(given.robot.cables.linear_density > 0.0))
-    if light.size:
-        step = 'Give a density, or cable_mass="none".'
-        raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m for a cable with mass", step)
-
-
-def wave_frequency(given: InitialConditions, nodes: int) -> float:
-    """Highest angular frequency of chains [rad/s], computed for the shortest element that can occur."""
-    material = given.robot.cables
-    element = given.state.free_length / nodes
-    return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.dynamics.simulation.initial_conditions import InitialConditions
-from sagline.dynamics.simulation.results import Simulation, displaced_pose, energy_balance, twist_of_origin
+from sagline.dynamics.simulation.results import EnergyBalance, Simulation, displaced_pose, twist_of_origin
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
 from sagline.kernels import codes
@@ -145,7 +145,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
         twist=twist_of_origin(given.robot, pose, moving[:, :3], moving[:, 3:]),
         tensions=locked(at_steps[kept].copy()),
         length=locked(lengths[kept].copy()),
-        energy=energy_balance(kinetic, potential, supplied, lost, np.zeros_like(lost)),
+        energy=EnergyBalance._of(kinetic, potential, supplied, lost, np.zeros_like(lost)),
         events=(),
         cable_mass="modal",
         step=size,

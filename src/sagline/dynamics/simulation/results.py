@@ -185,6 +185,12 @@ class EnergyBalance(Result):
     removed: Array
     error: Array
 
+    @classmethod
+    def _of(cls, kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:
+        """Compute the energy balance from five energies [J], each of shape (N,)."""
+        total = kinetic + potential - supplied + lost + removed
+        return cls(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Occurrence:
@@ -261,12 +267,6 @@ class Simulation(Result, Saved, Tabular):
     damping: Damping = field(default_factory=Damping)
     largest_tension: Array | None = None
     anchors: AnchorMotion | None = None
-
-
-def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:
-    """Compute the energy balance from five energies [J], each of shape (N,)."""
-    total = kinetic + potential - supplied + lost + removed
-    return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
 
 
 def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:

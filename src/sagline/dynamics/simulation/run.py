@@ -196,7 +196,7 @@ class SimulationRun:
             twist=results.twist_of_origin(plant.robot, pose, velocity, spin),
             tensions=locked(self._record.tensions[:count].copy()),
             length=locked(self._record.lengths[:count].copy()),
-            energy=results.energy_balance(kinetic, potential, supplied, lost - removed, removed.copy()),
+            energy=results.EnergyBalance._of(kinetic, potential, supplied, lost - removed, removed.copy()),
             events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
             cable_mass=plant.cable_mass,
             step=self.step,

@@ -12,7 +12,7 @@ from sagline.core.arguments import choice, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.dynamics.simulation.chain_plant import FEWEST, MOST, ChainPlant, check_lumped, wave_frequency
+from sagline.dynamics.simulation.chain_plant import FEWEST, MOST, ChainPlant
 from sagline.dynamics.simulation.initial_conditions import InitialConditions, TableInTime, TimeTable, initial_conditions
 from sagline.dynamics.simulation.modal import modal_simulation
 from sagline.dynamics.simulation.plant import Plant
@@ -156,7 +156,7 @@ def simulate(
 def losses_after_break(given: InitialConditions, elements: int = 0) -> Damping:
     """Energy losses of the cables after a break. They are assumed if the caller gives no losses."""
     if elements:  # the damping of waves in stiff cables does not require smaller steps than the waves
-        return Damping(loss_time=min(LOSS_TIME, 2.0 / wave_frequency(given, elements)))
+        return Damping(loss_time=min(LOSS_TIME, 2.0 / ChainPlant.wave_frequency(given, elements)))
     return Damping(loss_time=LOSS_TIME)
 
 
@@ -175,7 +175,7 @@ def started_run(
 ) -> SimulationRun:
     """Prepare a simulation at its first step."""
     if elements:
-        check_lumped(given)
+        ChainPlant.check(given)
     air = TimeTable.constant(np.zeros(3)) if wind is None else TimeTable.of(wind, "wind", "m/s", 3, given.begin)
     happening = checked_events(events, given.robot, given.begin, given.end, pieces=elements > 0)
     plant, rules, size, losses = initial_plant(
@@ -262,7 +262,7 @@ def _time_step(
 ) -> float:
     """Check `step` [s] at the smallest platform mass. `elements`: number of elements of a cable with mass, else 0."""
     robot, lengths = given.robot, given.lengths.value
-    waves = wave_frequency(given, elements) if elements else 0.0
+    waves = ChainPlant.wave_frequency(given, elements) if elements else 0.0
     highest = highest_frequency(robot, given.poses, lengths, kind, data, _lightness(robot.mass, events), given.frames)
     # losses limit the step only for massless cables; for cables with mass, they are integrated implicitly
     return _checked_step(step, code, highest, Damping() if elements else losses, kind == d.DRUMS, waves)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.core.arguments import optional
-from sagline.core.arrays import Array, checked, locked
+from sagline.core.arrays import Array, Indices, checked, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.fields import NumberFields, rule
 from sagline.core.memory import check_memory
@@ -17,7 +17,7 @@ from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import cable_slopes
-from sagline.statics.strings import Strings, strings_of
+from sagline.statics.strings import Strings, strings_of, undamped
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,22 +128,28 @@ def check_model(state: Equilibrium) -> None:
 def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
     """Difference between dynamic and static stiffness of the cables of one state."""
     # shapes: frequency (F,) [Hz]; returns (F, m, 3, 3) [N/m]
-    waves = waves_of(frequency, damping)
-    kind = np.float64 if damping is None else np.complex128
-    m = strings.table.shape[1]
-    found = np.full((1, frequency.size, m, collocation.FOUND), np.nan, dtype=kind)
-    taut = np.flatnonzero(strings.taut[0])
-    part = np.empty((1, frequency.size, taut.size, collocation.FOUND), dtype=kind)
-    counts = np.empty((*part.shape[:-1], 2), dtype=np.int64)
-    work = np.empty(collocation.ROOM, dtype=kind)
-    real = waves if damping is not None else np.ascontiguousarray(waves.real)
-    dynamic_stiffnesses(np.ascontiguousarray(strings.table[:, taut]), real, EXACT, work, part, counts)
-    check_counts(counts, frequency)
-    found[:, :, taut] = part
-    return in_world(found[0], strings.axes[0])
+    taut, found, _ = taut_stiffness(strings, 0, frequency, damping, EXACT)
+    moving = np.full((frequency.size, strings.taut.shape[1], 3, 3), np.nan, dtype=np.complex128)
+    moving[:, taut] = found
+    return moving
 
 
-def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
+def taut_stiffness(
+    strings: Strings, row: int, frequency: Array, damping: Damping | None, phase: float
+) -> tuple[Indices, Complex, Indices]:
+    """Indices of taut cables, their dynamic minus static stiffness, and numbers of their modes below `frequency`."""
+    # shapes: frequency (F,) [Hz]; phase of a wave in an element [rad]; returns (t,), (F, t, 3, 3) [N/m], (1, F, t, 2)
+    waves = undamped(frequency[None]) if damping is None else waves_of(frequency, damping)
+    taut = np.flatnonzero(strings.taut[row])
+    table = np.ascontiguousarray(strings.table[row : row + 1, taut])
+    found = np.empty((1, frequency.size, taut.size, collocation.FOUND), dtype=waves.dtype)
+    counts = np.empty((*found.shape[:-1], 2), dtype=np.int64)
+    dynamic_stiffnesses(table, waves, phase, np.empty(collocation.ROOM, dtype=waves.dtype), found, counts)
+    _check_counts(counts, frequency)
+    return taut, in_world(found[0], strings.axes[row, taut]), counts
+
+
+def _check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
     """Reject `frequency` if a cable would need too many elements, or has no solution, at one of its values."""
     # shapes: counts (1, F, m, 2); frequency (F,) [Hz]
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
@@ -173,11 +179,10 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
 def waves_of(frequency: Array, damping: Damping | None) -> Complex:
     """Array for the kernels that contains `frequency` and `damping`."""
     # shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS)
-    omega = 2.0 * np.pi * frequency
-    waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)
-    waves[0, :, collocation.OMEGA], waves[0, :, collocation.SQUARE] = omega, omega**2
-    waves[0, :, collocation.DRAG] = 0.0 if damping is None else 1j * omega * damping.air_damping
-    waves[0, :, collocation.ACROSS] = 1.0 / (1.0 if damping is None else 1.0 + 2j * damping.modal_damping)
-    stretch = 1.0 if damping is None else 1.0 + 1j * omega * damping.loss_time
-    waves[0, :, collocation.ALONG] = waves[0, :, collocation.ACROSS] / stretch
+    waves: Complex = undamped(frequency[None]).astype(np.complex128)
+    if damping is not None:
+        rate = 1j * waves[..., collocation.OMEGA]
+        waves[..., collocation.DRAG] = rate * damping.air_damping
+        waves[..., collocation.ACROSS] /= 1.0 + 2j * damping.modal_damping
+        waves[..., collocation.ALONG] = waves[..., collocation.ACROSS] / (1.0 + rate * damping.loss_time)
     return waves

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import ClassVar, Final, TypeAlias
 
 import numpy as np
 
@@ -13,9 +14,9 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result, Saved
 from sagline.core.table import Columns, Tabular
-from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model
-from sagline.dynamics.vibration.response import Receptance, modal_receptance, peak_receptance
-from sagline.dynamics.vibration.robot_modes import VibrationModel, state_modes
+from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_model
+from sagline.dynamics.vibration.response import Receptance
+from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
 from sagline.dynamics.vibration.vibration import UP_TO, VibrationStatus
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
@@ -159,17 +160,23 @@ def _numbers_of_pose(
     """Compute the values of one pose, in the order of `FrequencyMap`; `lowest`: lowest massless frequency [Hz]."""
     freedom = model.freedom
     rest = compliance_of(freedom, model.stiffness[row, None])[0, :3, :3]
-    found = state_modes(model, row, up_to)
+    found = model.modes(row, up_to)
     if not found.number:
         return np.nan, lowest, np.nan, float(np.linalg.norm(rest, 2)), 0.0
     first = found.platform[:, 0]
-    receptance = modal_receptance(found, rest, damping.modal_damping)
+    receptance = _modal_receptance(found, rest, damping.modal_damping)
     if damping.loss_time > 0.0 or damping.air_damping > 0.0:
         slopes = cable_slopes(state[row])
-        receptance = Receptance(model.at(row), slopes.matrix, slopes.blocks, damping).coupled(up_to)
+        exact = Receptance(model.at(row), slopes.matrix, slopes.blocks, damping)
+        held = exact.fixed_end_modes(up_to)
+
+        def receptance(frequency: Array) -> Complex:
+            """Receptance for losses that couple the modes."""
+            return exact.by_modes(frequency, held)[0][:, :3, :3]
+
     shares = found.cable_shares() if damping.air_damping > 0.0 else np.zeros((0, found.number))
     ratios = found.damping_ratios(state.one_robot.cables.linear_density[: len(shares)], shares, damping)
-    peak, at = peak_receptance(receptance, found.frequency, ratios, damping)
+    peak, at = _peak_receptance(receptance, found.frequency, ratios, damping)
     return float(found.frequency[0]), lowest, float(first @ model.mass[row] @ first), peak, at
 
 
@@ -177,3 +184,63 @@ def _at_pose(index: int, error: SaglineError) -> SaglineError:
     if isinstance(error, InvalidValueError):
         return InvalidValueError(f"pose {index}: {error.item}", error.value, error.allowed, error.next_step)
     return SaglineError(f"pose {index}: {error}")
+
+
+_ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacements per force (F, 3, 3) at frequencies (F,)
+
+# the search omits modes whose response is below this share of the largest response at a mode
+LIKELY: Final = 0.4
+REFINEMENTS: Final = 2  # number of refinements of the search
+CLOSER: Final = 5  # number of new frequencies between two adjacent frequencies
+WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in units of half the peak width
+
+
+def _modal_receptance(found: StateModes, rest: Array, ratio: float) -> _ForceReceptance:
+    """Receptance from the modes of a robot. A common loss factor of the whole stiffness does not couple these modes."""
+    # shapes: rest (3, 3)
+    natural = (2.0 * np.pi * found.frequency) ** 2
+    products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
+    lossy = 1.0 + 2j * ratio
+    beyond = (rest - (products @ (1.0 / natural)).reshape(3, 3)) / lossy
+
+    def receptance(frequency: Array) -> Complex:
+        terms = 1.0 / (lossy * natural - (2.0 * np.pi * frequency[:, None]) ** 2)
+        return np.asarray(beyond + (terms @ products.T).reshape(-1, 3, 3))
+
+    return receptance
+
+
+def _peak_receptance(
+    receptance: _ForceReceptance, natural: Array, ratios: Array, damping: Damping
+) -> tuple[float, float]:
+    """Largest displacement per force in any direction, static or near a mode."""
+    # shapes: natural (K,) [Hz]; ratios (K,); returns [m/N], [Hz]
+    if damping == Damping():
+        return np.inf, float(natural[0])
+    around = np.concatenate(([0.0], natural))
+    sizes = np.linalg.norm(receptance(around), axis=(1, 2))
+    likely = np.flatnonzero(sizes[1:] >= LIKELY * sizes.max())
+    near = natural[likely, None] * (1.0 + ratios[likely, None] * WIDTHS)
+    frequency = np.unique(np.concatenate((around[:1], near.ravel())))
+    for _ in range(REFINEMENTS):
+        found = receptance(frequency)
+        norms = np.sqrt(np.linalg.eigvalsh(np.swapaxes(found.conj(), -1, -2) @ found)[:, -1])
+        best = int(np.argmax(norms))
+        if not 0 < best < norms.size - 1:
+            return float(norms[best]), float(frequency[best])
+        top, before, after = (frequency[best + k] for k in (0, -1, 1))
+        frequency = np.concatenate((np.linspace(before, top, CLOSER), np.linspace(top, after, CLOSER)[1:]))
+    return _parabola_peak(np.array((before, top, after)), norms[best - 1 : best + 2])
+
+
+def _parabola_peak(frequency: Array, norms: Array) -> tuple[float, float]:
+    """Height and place of a peak from three values of `norms`, by a parabola through their inverse squares."""
+    (before, after), flat = np.diff(frequency), norms**-2.0
+    left, right = np.diff(flat) / (before, after)
+    bend = (right - left) / (before + after)
+    if not bend > 0.0:
+        return float(norms[1]), float(frequency[1])
+    slope = (left * after + right * before) / (before + after)
+    off = -0.5 * slope / bend
+    least = flat[1] + 0.5 * slope * off
+    return float(least**-0.5), float(frequency[1] + off)

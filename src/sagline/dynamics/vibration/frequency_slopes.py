@@ -13,7 +13,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import check_model, check_solved, single_state
 from sagline.dynamics.vibration.flexibility import Flexibility, flexibility
-from sagline.dynamics.vibration.mode_sensitivities import ModeGroup, StateSlopes, mode_groups
+from sagline.dynamics.vibration.mode_sensitivities import ModeGroup, StateSlopes
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of, of_result
 from sagline.statics.stiffness import modes
@@ -114,7 +114,7 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
         raise InvalidValueError("state", told, "a vibration that was solved", "Use its state for massless frequencies.")
     rest = _rest(vibration.state)
     groups = list(_groups(vibration.frequency, together))
-    slopes = [one.square_derivatives(rest) for one in mode_groups(rest, vibration.frequency, groups)]
+    slopes = [one.square_derivatives(rest) for one in rest.mode_groups(vibration.frequency, groups)]
     return _result(vibration.state, True, vibration.frequency, groups, slopes)
 
 

@@ -14,13 +14,7 @@ from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, single_state
 from sagline.dynamics.vibration.flexibility import flexibility
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
-from sagline.statics.slopes import (
-    CableSlopes,
-    cable_slopes,
-    frame_end_forces,
-    motions_of_ends,
-    on_platform,
-)
+from sagline.statics.slopes import CableSlopes, cable_slopes, frame_end_forces, motions_of_ends, on_platform
 from sagline.statics.stiffness import mass_matrix, modes
 
 if TYPE_CHECKING:

@@ -34,6 +34,11 @@ class StateSlopes(NamedTuple):
         settling = np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity))
         return cls(state, slopes, by_datum, settling, known.compliance, mass_matrix(state))
 
+    def mode_groups(self, frequency: Array, groups: list[Indices]) -> Iterator[ModeGroup]:
+        """Modes of each group of adjacent frequencies that count as equal; `frequency` [Hz] of all modes."""
+        cables = _string_data(self)
+        return (_mode_group(self, cables, frequency[group]) for group in groups)
+
 
 class ModeGroup(NamedTuple):
     """The g modes of one frequency, and the effect of changes of cable data on each pair of modes."""
@@ -137,12 +142,6 @@ def _string_data(rest: StateSlopes) -> tuple[_StringData, ...]:
         _StringData(rest.slopes.force[i], gravity * float(density[i]), length, float(stiffness[i]), float(density[i]))
         for i, length in enumerate(cables.unstrained_length.tolist())
     )
-
-
-def mode_groups(rest: StateSlopes, frequency: Array, groups: list[Indices]) -> Iterator[ModeGroup]:
-    """Modes of each group of adjacent frequencies that count as equal; `frequency` [Hz] of all modes."""
-    cables = _string_data(rest)
-    return (_mode_group(rest, cables, frequency[group]) for group in groups)
 
 
 def _mode_group(rest: StateSlopes, cables: tuple[_StringData, ...], frequency: Array) -> ModeGroup:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Final, NamedTuple, TypeAlias
 
@@ -17,7 +16,6 @@ from sagline.core.memory import check_memory
 from sagline.core.progress import blocks
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
-from sagline.dynamics.vibration import robot_modes
 from sagline.dynamics.vibration.component_modes import CableComponents, PlaneModes
 from sagline.dynamics.vibration.dynamic_stiffness import (
     Complex,
@@ -27,6 +25,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import (
     moving_stiffness,
     single_state,
 )
+from sagline.dynamics.vibration.robot_modes import VibrationModel
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import cable_slopes
@@ -46,7 +45,7 @@ FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]
 class Receptance(NamedTuple):
     """Model of the platform's receptance."""
 
-    model: robot_modes.VibrationModel  # model of one state, with a leading axis 1
+    model: VibrationModel  # model of one state, with a leading axis 1
     matrix: Array  # stiffness of the platform, not symmetric with an external moment, shape (6, 6)
     cables: Array  # stiffness of the cables at their platform ends, shape (m, 3, 3)
     damping: Damping  # energy losses
@@ -73,11 +72,6 @@ class Receptance(NamedTuple):
         moving -= 2j * self.damping.modal_damping * self.cables  # the whole stiffness already includes modal damping
         moving[:, ~strings.taut[0]] = 0.0
         return self._compliance(frequency, moving)
-
-    def coupled(self, up_to: float) -> ForceReceptance:
-        """Function that computes the receptance up to the frequency `up_to` [Hz], for losses that couple the modes."""
-        held = self.fixed_end_modes(up_to)
-        return lambda frequency: self.by_modes(frequency, held)[0][:, :3, :3]
 
     def _compliance(self, frequency: Array, moving: Complex) -> Complex:
         """Compliance: inverse of the dynamic stiffness. `moving` (F, m, 3, 3): dynamic part of cables' stiffness."""
@@ -138,66 +132,6 @@ def _driven_stiffness_with_loss(
     far = by_end[..., near:, :] / (alone[..., near:] + factor[..., 0] * stretched)[..., None]
     moved = np.concatenate((np.linalg.solve(own, by_end[..., :near, :]), far), axis=2)
     return -np.swapaxes(by_end, -1, -2) @ moved, factor * lost[:, None, :d, :d]
-
-
-ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacements per force (F, 3, 3) at frequencies (F,)
-
-# the search omits modes whose response is below this share of the largest response at a mode
-LIKELY: Final = 0.4
-REFINEMENTS: Final = 2  # number of refinements of the search
-CLOSER: Final = 5  # number of new frequencies between two adjacent frequencies
-WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in units of half the peak width
-
-
-def modal_receptance(found: robot_modes.StateModes, rest: Array, ratio: float) -> ForceReceptance:
-    """Receptance from the modes of a robot. A common loss factor of the whole stiffness does not couple these modes."""
-    # shapes: rest (3, 3)
-    natural = (2.0 * np.pi * found.frequency) ** 2
-    products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
-    lossy = 1.0 + 2j * ratio
-    beyond = (rest - (products @ (1.0 / natural)).reshape(3, 3)) / lossy
-
-    def receptance(frequency: Array) -> Complex:
-        terms = 1.0 / (lossy * natural - (2.0 * np.pi * frequency[:, None]) ** 2)
-        return np.asarray(beyond + (terms @ products.T).reshape(-1, 3, 3))
-
-    return receptance
-
-
-def peak_receptance(
-    receptance: ForceReceptance, natural: Array, ratios: Array, damping: Damping
-) -> tuple[float, float]:
-    """Largest displacement per force in any direction, static or near a mode."""
-    # shapes: natural (K,) [Hz]; ratios (K,); returns [m/N], [Hz]
-    if damping == Damping():
-        return np.inf, float(natural[0])
-    around = np.concatenate(([0.0], natural))
-    sizes = np.linalg.norm(receptance(around), axis=(1, 2))
-    likely = np.flatnonzero(sizes[1:] >= LIKELY * sizes.max())
-    near = natural[likely, None] * (1.0 + ratios[likely, None] * WIDTHS)
-    frequency = np.unique(np.concatenate((around[:1], near.ravel())))
-    for _ in range(REFINEMENTS):
-        found = receptance(frequency)
-        norms = np.sqrt(np.linalg.eigvalsh(np.swapaxes(found.conj(), -1, -2) @ found)[:, -1])
-        best = int(np.argmax(norms))
-        if not 0 < best < norms.size - 1:
-            return float(norms[best]), float(frequency[best])
-        top, before, after = (frequency[best + k] for k in (0, -1, 1))
-        frequency = np.concatenate((np.linspace(before, top, CLOSER), np.linspace(top, after, CLOSER)[1:]))
-    return _parabola_peak(np.array((before, top, after)), norms[best - 1 : best + 2])
-
-
-def _parabola_peak(frequency: Array, norms: Array) -> tuple[float, float]:
-    """Height and place of a peak from three values of `norms`, by a parabola through their inverse squares."""
-    (before, after), flat = np.diff(frequency), norms**-2.0
-    left, right = np.diff(flat) / (before, after)
-    bend = (right - left) / (before + after)
-    if not bend > 0.0:
-        return float(norms[1]), float(frequency[1])
-    slope = (left * after + right * before) / (before + after)
-    off = -0.5 * slope / bend
-    least = flat[1] + 0.5 * slope * off
-    return float(least**-0.5), float(frequency[1] + off)
 
 
 CHECKS: Final = 8  # number of frequencies for the comparison with the exact response
@@ -275,10 +209,10 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
         raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give at least one.")
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Split them into parts.")
     known = optional(damping, Damping, "damping") or Damping()
-    model = robot_modes.VibrationModel.of(state)
+    model = VibrationModel.of(state)
     check_solved(state)
     highest = float(given.max())
-    robot_modes.check_mode_count(robot_modes.modes_below(model, 0, max(highest, LOWEST)), highest, "frequency")
+    model.checked_count(0, max(highest, LOWEST), "frequency")
     if model.massless_modes(0)[1].shape[1]:
         step = "Simulate it; vibration() names the unstable directions."
         raise InvalidValueError("state", "an unstable equilibrium", "a stable equilibrium, which has a response", step)

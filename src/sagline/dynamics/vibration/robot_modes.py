@@ -11,15 +11,13 @@ import numpy as np
 from sagline.core.arrays import Array, Flags
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.dynamics.vibration.component_modes import CableComponents
-from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_counts, in_world
-from sagline.kernels.dynamics import collocation
+from sagline.dynamics.vibration.dynamic_stiffness import Damping, taut_stiffness
 from sagline.kernels.dynamics import string as columns
-from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
-from sagline.statics.strings import COUNTING, Strings, strings_of, undamped
+from sagline.statics.strings import COUNTING, Strings, strings_of
 
 KEPT = 1.05  # fixed-end modes up to this factor times the requested frequency are unknowns
 LEVELS = 4  # number of matched pairs of moments (Krylov) of the higher modes
@@ -84,6 +82,42 @@ class VibrationModel(NamedTuple):
         squares, vectors = np.linalg.eigh(upper.T @ freedom @ self.stiffness[row] @ freedom.T @ upper)
         return natural_frequency(squares), freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
 
+    def modes_below(self, row: int, frequency: float) -> int:
+        """Number of the robot's modes with cable mass below `frequency` [Hz]."""
+        # Wittrick-Williams count: number of fixed-end modes of the taut cables, plus number of negative eigenvalues of
+        # the platform's dynamic stiffness
+        taut, found, counts = taut_stiffness(self.strings, row, np.array([frequency]), None, COUNTING)
+        moving = np.zeros((self.strings.taut.shape[1], 3, 3))
+        moving[taut] = found[0].real
+        matrix = _dynamic_matrix(self, row, moving, 2.0 * np.pi * frequency)
+        return int(counts.sum()) + int((np.linalg.eigvalsh(matrix) < 0.0).sum())
+
+    def checked_count(self, row: int, frequency: float, item: str) -> int:
+        """Number of modes below `frequency` [Hz]; rejects the argument `item` if the number is too large."""
+        count = self.modes_below(row, frequency)
+        if count > MOST_MODES:
+            value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
+            raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
+        return count
+
+    def modes(self, row: int, up_to: float) -> StateModes:
+        """Modes of the state `row` below `up_to` [Hz]. The exact count checks the number of modes."""
+        _check_string_count(self.strings, row, up_to, "up_to")
+        count = self.checked_count(row, up_to, "up_to")
+        problem = self.reduced(row, up_to)
+        square, vectors = np.linalg.eigh(problem.matrix)
+        frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
+        border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
+        if not border[0] <= count <= border[1]:
+            text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found; the exact count is {count}"
+            raise SaglineError(f"{text}. Use another up_to, and report the robot and its pose.")
+        # cable mass has no static effect, so that the number of modes at exactly 0 Hz does not change
+        if count and frequency[0] < SLOW * up_to:
+            frequency[: np.count_nonzero(self.massless_modes(row)[0] == 0.0)] = 0.0
+        vectors = vectors[:, :count]
+        platform = problem.platform @ vectors[: problem.platform.shape[1]]
+        return StateModes(frequency[:count], platform, self.ends[row] @ platform, count, problem, vectors)
+
 
 class _ReducedModel(NamedTuple):
     """Eigenproblem of one state."""
@@ -126,24 +160,6 @@ def _dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float
 def _on_platform(of_cables: Array, ends: Array) -> Array:
     """Combine the matrices of all platform ends (m, 3, 3) into a matrix of the platform, (6, 6)."""
     return np.asarray((np.swapaxes(ends, -1, -2) @ of_cables @ ends).sum(axis=0))
-
-
-def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
-    """Number of the robot's modes with cable mass below `frequency` [Hz]."""
-    # Wittrick-Williams count: number of fixed-end modes of the taut cables, plus number of negative eigenvalues of the
-    # platform's dynamic stiffness
-    taut = np.flatnonzero(model.strings.taut[row])
-    given = np.array([frequency])
-    found = np.empty((1, 1, taut.size, collocation.FOUND))
-    counts = np.empty((1, 1, taut.size, 2), dtype=np.int64)
-    table = np.ascontiguousarray(model.strings.table[row : row + 1, taut])
-    work = np.empty(collocation.ROOM)
-    dynamic_stiffnesses(table, undamped(given[None]), COUNTING, work, found, counts)
-    check_counts(counts, given)
-    moving = np.zeros((model.strings.taut.shape[1], 3, 3))
-    moving[taut] = in_world(found[0], model.strings.axes[row, taut])[0].real
-    matrix = _dynamic_matrix(model, row, moving, 2.0 * np.pi * frequency)
-    return int(counts.sum()) + int((np.linalg.eigvalsh(matrix) < 0.0).sum())
 
 
 MOST_MODES: Final = 2_000
@@ -197,26 +213,6 @@ class StateModes:
         return np.asarray(damping.modal_damping + ratio)
 
 
-def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
-    """Compute the modes of the state `row` below `up_to` [Hz]. The exact count checks the number of modes."""
-    _check_string_count(model.strings, row, up_to, "up_to")
-    count = modes_below(model, row, up_to)
-    check_mode_count(count, up_to, "up_to")
-    problem = model.reduced(row, up_to)
-    square, vectors = np.linalg.eigh(problem.matrix)
-    frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
-    border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
-    if not border[0] <= count <= border[1]:
-        text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found; the exact count is {count}"
-        raise SaglineError(f"{text}. Use another up_to, and report the robot and its pose.")
-    # cable mass has no static effect, so that the number of modes at exactly 0 Hz does not change
-    if count and frequency[0] < SLOW * up_to:
-        frequency[: np.count_nonzero(model.massless_modes(row)[0] == 0.0)] = 0.0
-    vectors = vectors[:, :count]
-    platform = problem.platform @ vectors[: problem.platform.shape[1]]
-    return StateModes(frequency[:count], platform, model.ends[row] @ platform, count, problem, vectors)
-
-
 def _check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
     """Reject `frequency` [Hz] before the exact count if the cables have far too many modes below it."""
     # In each of two directions, N half waves of a cable have the phase pi N. This phase is the integral of omega
@@ -234,10 +230,3 @@ def _check_string_count(strings: Strings, row: int, frequency: float, item: str)
         value = f"{frequency:g} Hz, below which the cables have about {count:,.0f} modes"
         step = "Lower it, or shorten the slack cables."
         raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", step)
-
-
-def check_mode_count(count: int, frequency: float, item: str) -> None:
-    """Reject `frequency` [Hz] if the number `count` of modes below it is too large."""
-    if count > MOST_MODES:
-        value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
-        raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")

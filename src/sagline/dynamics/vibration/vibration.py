@@ -13,9 +13,9 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result, Status
 from sagline.core.table import Columns, Tabular
 from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
-from sagline.dynamics.vibration import robot_modes
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model, single_state
 from sagline.dynamics.vibration.flexibility import stretch_losses
+from sagline.dynamics.vibration.robot_modes import VibrationModel
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.robot.robot import Robot
@@ -178,7 +178,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
     check_model(single_state(state))
     limit = number(up_to, "up_to", "Hz", above=0.0)
     given = optional(damping, Damping, "damping") or Damping()
-    model = robot_modes.VibrationModel.of(state)
+    model = VibrationModel.of(state)
     slack: tuple[int, ...] = tuple(int(i) for i in np.flatnonzero(~model.strings.taut[0]))
     cables, none = state.cables.shape[-1], np.empty(0)
     arrays = {  # without modes
@@ -195,7 +195,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
         arrays["massless_frequency"], arrays["negative_directions"] = model.massless_modes(0)
         if not arrays["negative_directions"].shape[1]:
             status = VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED
-            found = robot_modes.state_modes(model, 0, limit)
+            found = model.modes(0, limit)
             shares, count = found.cable_shares(), found.number
             arrays |= {
                 "frequency": found.frequency,
