@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from sagline.calibration.observations import (
     MachineTerms,
+    Readings,
     predicted_rows,
     whitened_rows,
 )
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.terms import PoseReadings
 from tests.calibration import reference
 from tests.calibration.four_cables import drawn_robot, log_with_inclinations, twin_of
 from tests.calibration.machines import robots, standing
@@ -54,7 +54,7 @@ def test_residuals_turn_the_predicted_into_the_measured_vertical() -> None:
     asked = reference.parameters(machine, ("mass",))
     terms = MachineTerms.of(machine.robot, sl.Catenary(), asked, level, np.zeros(8))
     none = np.full((2, 3), np.nan)
-    readings = PoseReadings(lengths, np.full(lengths.shape, np.nan), none, read.as_quat())
+    readings = Readings(lengths, np.full(lengths.shape, np.nan), none, read.as_quat())
     rows = whitened_rows(terms, readings, terms.winch_slopes(lengths), reference.pose_rows(pose), lengths)
     vectors = rows.residual[:, -3:]
     assert np.isnan(vectors[:, 2]).all()

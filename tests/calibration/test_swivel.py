@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
+from sagline.calibration.diagnostics import diagnose_log
 from sagline.calibration.observations import MachineTerms, unwhitened_slopes
 from sagline.calibration.parameters import parameters_of, with_values
 from sagline.core.arrays import Array
@@ -84,6 +85,15 @@ def test_a_log_with_swivel_angles_is_found(cells: bool, tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.residuals, found.residuals)
     np.testing.assert_array_equal(again.swivel_zero, found.swivel_zero)
     assert again.sensors.swivel_deviation == DEVIATION
+
+
+def test_exchanged_load_cells_of_a_log_with_swivel_angles_are_recognized() -> None:
+    _, log, _ = turned(2)
+    assert log.load_cells is not None
+    exchanged = log.replace(load_cells=log.load_cells[:, [2, 1, 0, 3]])
+    assert diagnose_log(drawn_robot(), log) == ()
+    (sentence,) = diagnose_log(drawn_robot(), exchanged)
+    assert "load cells of cables 0 and 2" in sentence
 
 
 def test_swivel_angles_reduce_the_error_of_the_height_of_the_center_of_mass() -> None:

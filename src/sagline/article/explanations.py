@@ -202,8 +202,7 @@ def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
     from scipy.optimize import lsq_linear
 
     low, high = limits(model)
-    values: Array = high * lsq_linear(slopes * high, right, bounds=(low / high, np.ones_like(high)), method="bvls").x
-    return values
+    return np.asarray(high * lsq_linear(slopes * high, right, bounds=(low / high, np.ones_like(high)), method="bvls").x)
 
 
 def corrected_aic(rms: float, count: int, parameters: int) -> float:

@@ -192,8 +192,7 @@ def _end_position_error(state: CableState) -> Array:
     )
     x, z = np.empty(horizontal.size), np.empty(horizontal.size)
     batch_end(horizontal, vertical, length, weight, stiffness, x, z)
-    error: Array = np.abs(x.reshape(shape) - state.span) + np.abs(z.reshape(shape) - state.rise)
-    return error
+    return np.asarray(np.abs(x.reshape(shape) - state.span) + np.abs(z.reshape(shape) - state.rise))
 
 
 def _estimate(shape: Array, value: Array) -> Estimate:

@@ -61,8 +61,7 @@ class CableFit(Result):
     def correlation(self) -> Array:
         """Correlations between the values, shape (k, k)."""
         error = self.standard_error
-        correlation: Array = self.covariance / np.outer(error, error)
-        return correlation
+        return np.asarray(self.covariance / np.outer(error, error))
 
     @property
     def warnings(self) -> tuple[str, ...]:

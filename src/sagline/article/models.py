@@ -55,8 +55,7 @@ def model_errors(axial_stiffness: float, *axes: ArrayLike) -> tuple[Array, Array
 
 def sufficient_models(length_error: Array, tolerance: float) -> Array:
     """Index of the least accurate model with a length error of at most `tolerance` [m], for each cable."""
-    coarsest: Array = np.argmax(np.abs(length_error) <= tolerance, axis=0)
-    return coarsest
+    return np.asarray(np.argmax(np.abs(length_error) <= tolerance, axis=0))
 
 
 def models_chapter() -> Chapter:

@@ -42,8 +42,7 @@ def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
     # Except for lines, all regressions of the article have this form. The shape is 1/T_x^2, D^3, cos^4(phi), rho^2, D
     # or rho.
     shape, y = np.broadcast_arrays(shape, y)
-    factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
-    return factor
+    return np.asarray(np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis))
 
 
 class End(NamedTuple):
@@ -168,8 +167,7 @@ class SagStudy:
     @property
     def fitted_q_a(self) -> Array:
         """Factor q_a according to equation (44) [N^2/m^2], shape (a, r)."""
-        fitted: Array = self.p_q * np.cos(self.sampling.angles)[:, None] ** 4
-        return fitted
+        return np.asarray(self.p_q * np.cos(self.sampling.angles)[:, None] ** 4)
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> tuple[sl.CableState, sl.CableState, Array, Array]:

@@ -25,13 +25,6 @@ from sagline.statics.stiffness import natural_frequency
 from sagline.statics.tables import body_table, cable_table
 
 
-class FurtherReadings(NamedTuple):
-    """Readings at N poses."""
-
-    swivels: Array | None  # swivel angles [rad], (N, m), NaN if missing; None for readings that equal the predictions
-    frequencies: Array | None  # natural frequencies [Hz], (N, K), NaN if missing; None without frequencies
-
-
 class FurtherRows(NamedTuple):
     """Residuals and derivatives of E readings at N poses."""
 

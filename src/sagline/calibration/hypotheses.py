@@ -144,6 +144,7 @@ class Trial:
         rows = self.rows[(read_at >= 0) & (read_at < len(log))]
         rows = rows[evenly_spaced(len(rows), most)]
         given = ReadingsTable.of(log.rows(rows))._replace(swivels=None, frequencies=None)
+        sensors = log.sensors.replace(swivel_deviation=None, frequency_deviation=None)
         read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows + change.behind], change.lengths)
         if log.load_cells is not None:
             cells = CELL_UNITS[change.cell_unit] * log.load_cells[rows + late]
@@ -156,8 +157,8 @@ class Trial:
         if change.tilt:
             given = given._replace(rotations=_changed_tilt(given.rotations, TILTS[change.tilt]))
         wide = [Unknown(name, deviation=width) for name, width in _WIDE.items() if self._has(name, counted)]
-        parameters = parameters_of(self.robot, wide, log.sensors, counted=counted)
-        problem = FitProblem(self.robot, self.model, log.sensors, parameters, given)
+        parameters = parameters_of(self.robot, wide, sensors, counted=counted)
+        problem = FitProblem(self.robot, self.model, sensors, parameters, given)
         poses = self._poses(problem, change, most) if log.commanded is None else log.commanded[rows]
         moved = np.zeros(m)
         shifted = list(change.moved)

@@ -53,7 +53,7 @@ def whitened_at(
     machine = state.machine
     at = state.lengths[part] if free_of_noise else reported
     slopes = problem.winch_slopes(machine, at, part, counted=not free_of_noise)
-    readings, further = problem.readings(reported, part), problem.further(part)
+    readings = problem.readings(reported, part)
     turning = problem.parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     turn = left_jacobian(state.numbers[turning]) if turning[0] >= 0 else None
     if direction is not None and turn is not None:
@@ -62,7 +62,7 @@ def whitened_at(
     if problem.straight:
         rows = straight_rows(machine, readings, slopes, state.poses[part])
     else:
-        rows = whitened_rows(machine, readings, slopes, state.poses[part], state.lengths[part], direction, further)
+        rows = whitened_rows(machine, readings, slopes, state.poses[part], state.lengths[part], direction)
     if direction is None and turn is not None:
         rows.matrix[..., turning] = rows.matrix[..., turning] @ turn
     return rows

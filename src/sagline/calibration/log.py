@@ -14,7 +14,7 @@ from sagline.core.arrays import Array, Flags, Indices, checked, exactly, locked,
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.indices import part_of
-from sagline.core.results import Result, Saved
+from sagline.core.results import Result, Saved, set_fields
 from sagline.core.table import Columns, Tabular
 from sagline.robot.pose import Pose, PoseLike, single_pose, unit
 from sagline.robot.robot import Robot
@@ -109,9 +109,8 @@ class Sensors(_Replaceable):
                 if about.name == "rotation_deviation" and not np.isfinite(own if own.ndim == 0 else own[:2]).all():
                     step = "Give None if rotations are not measured; only the third value may be infinite."
                     raise InvalidValueError(about.name, "infinite", "finite about x and y", step)
-                object.__setattr__(self, about.name, own)
-        object.__setattr__(self, "frame", single_pose(self.frame, "frame"))
-        object.__setattr__(self, "target", exactly(self.target, "target", "m", (3,)))
+                set_fields(self, **{about.name: own})
+        set_fields(self, frame=single_pose(self.frame, "frame"), target=exactly(self.target, "target", "m", (3,)))
 
 
 def measures_yaw(sensors: Sensors) -> bool:
@@ -226,24 +225,24 @@ class WinchLog(_Replaceable, Saved, Tabular):
         name, unit_, values = _lengths_or_counts(self.counts, self.unstrained_length)
         read = _table(values, name, unit_, None, None)
         n, m = read.shape
-        object.__setattr__(self, name, read)
+        set_fields(self, **{name: read})
         columns_of = (("load_cells", "N", m), ("position", "m", 3), ("rotation", "", 4), ("swivel", "rad", m))
         for name, unit_, columns in columns_of:
             if (value := getattr(self, name)) is not None:
                 table = _table(value, name, unit_, n, columns)
-                object.__setattr__(self, name, _quaternions(table) if name == "rotation" else table)
+                set_fields(self, **{name: _quaternions(table) if name == "rotation" else table})
         if self.frequency is not None:
-            object.__setattr__(self, "frequency", _ascending(_table(self.frequency, "frequency", "Hz", n, None)))
+            set_fields(self, frequency=_ascending(_table(self.frequency, "frequency", "Hz", n, None)))
         if self.time is not None:
             time = checked(self.time, "time", "s")
             if time.shape != (n,):
                 raise InvalidValueError("time", f"of shape {time.shape}", f"shape ({n},)", "Give one per row.")
-            object.__setattr__(self, "time", time)
+            set_fields(self, time=time)
         if (pose := optional(self.commanded, Pose, "commanded")) is not None and pose.shape != (n,):
             value = f"a batch of {len(pose)}" if pose.shape else "a single pose"
             raise InvalidValueError("commanded", value, f"a batch of {n}", "Give one per row of the log.")
         instance(self.sensors, Sensors, "sensors")
-        object.__setattr__(self, "source", text(self.source, "source"))
+        set_fields(self, source=text(self.source, "source"))
         _check_sensors(self, m)
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel
-from sagline.calibration.further import FurtherReadings, FurtherRows, frequency_rows, swivel_rows, whitened_further
+from sagline.calibration.further import FurtherRows, frequency_rows, swivel_rows, whitened_further
 from sagline.calibration.log import Sensors, load_cells_of, measures_yaw, reading_deviations
 from sagline.calibration.parameters import Parameters, slopes_of_values
 from sagline.core.arrays import Array, kernel_input, locked
@@ -55,6 +55,17 @@ def has_drum_data(robot: Robot) -> bool:
 def _known_field(of: Winch | Cable, name: str) -> Array:
     """Value of a field of the winches; `drums_of` has checked that the field is not None."""
     return np.asarray(getattr(of, name))
+
+
+class Readings(NamedTuple):
+    """Readings at N poses; NaN for a missing reading."""
+
+    lengths: Array  # reported lengths [m], (N, m)
+    cells: Array  # readings of the load cells [N], (N, m)
+    positions: Array  # measured positions [m], (N, 3)
+    rotations: Array  # measured rotations, unit quaternions, scalar last, (N, 4)
+    swivels: Array | None = None  # swivel angles [rad], (N, m); None for readings that equal the predictions
+    frequencies: Array | None = None  # natural frequencies [Hz], (N, K); None without frequencies
 
 
 class WhitenedRows(NamedTuple):
@@ -205,30 +216,28 @@ class MachineTerms(NamedTuple):
 
 def whitened_rows(
     machine: MachineTerms,
-    readings: PoseReadings,
+    readings: Readings,
     slopes: Array,
     poses: Array,
     lengths: Array,
     direction: Array | None = None,
-    further: FurtherReadings | None = None,
 ) -> WhitenedRows:
     """Whitened readings and derivatives at equilibria; NaN where the equilibrium is not stable."""
     # slopes: derivatives of reported lengths (5, N, m) from `winch_slopes`. If `direction` (P,) is given, only the
     # slopes along this direction are computed, so that P is 1 in the result.
     found = _observed(machine, readings, slopes, poses, lengths, direction)
-    if further is None:
+    if machine.sensors.swivel_deviation is None and readings.frequencies is None:
         return found
-    return _with_further(machine, readings, slopes, poses, lengths, direction, further, found)
+    return _with_further(machine, readings, slopes, poses, lengths, direction, found)
 
 
 def _with_further(
     machine: MachineTerms,
-    readings: PoseReadings,
+    readings: Readings,
     slopes: Array,
     poses: Array,
     lengths: Array,
     direction: Array | None,
-    further: FurtherReadings,
     found: WhitenedRows,
 ) -> WhitenedRows:
     """The whitened rows `found`, with those of further readings after them."""
@@ -242,16 +251,16 @@ def _with_further(
     scale, places = np.where(where >= 0, factor[where], 0.0), where if direction is None else np.minimum(where, 0)
     parts, modes = [], 0
     if sensors.swivel_deviation is not None:
-        swivels = machine.swivel_zero, further.swivels
+        swivels = machine.swivel_zero, readings.swivels
         parts.append(swivel_rows(machine.robot, *swivels, poses, places, scale, motion))
-    if further.frequencies is not None:
-        modes, paid = further.frequencies.shape[1], np.zeros((len(poses), m, motion[0].shape[2]))
+    if readings.frequencies is not None:
+        modes, paid = readings.frequencies.shape[1], np.zeros((len(poses), m, motion[0].shape[2]))
         for row, change in zip((*LENGTH_KINDS,), slopes, strict=True):
             for i in np.flatnonzero(places[row] >= 0):
                 paid[:, i, places[row, i]] += scale[row, i] * change[:, i]
         at = poses, lengths, places, scale, paid
         steps = _steps(machine) if direction is None else 1.0 / np.abs(direction / _steps(machine)).max(keepdims=True)
-        parts.append(frequency_rows(machine.robot, machine.terms, further.frequencies, *at, steps))
+        parts.append(frequency_rows(machine.robot, machine.terms, readings.frequencies, *at, steps))
     rows = FurtherRows(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
     deviation, given = reading_deviations(sensors, m, modes), np.broadcast_to(sensors.length_deviation, m)
     off = readings.lengths - lengths
@@ -269,17 +278,15 @@ def _steps(machine: MachineTerms) -> Array:
     return machine.parameters.usual_deviation * FREQUENCY_STEP
 
 
-def _no_readings(lengths: Array) -> PoseReadings:
+def _no_readings(lengths: Array) -> Readings:
     """Lengths (N, m) [m] with other readings that are not missing, for derivatives of predictions."""
     count = len(lengths)
-    return PoseReadings(
-        lengths, np.zeros(lengths.shape), np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
-    )
+    return Readings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
 
 
 def _observed(
     machine: MachineTerms,
-    readings: PoseReadings,
+    readings: Readings,
     slopes: Array,
     poses: Array,
     lengths: Array,
@@ -305,7 +312,7 @@ def _observed(
         machine.terms,
         (machine.robot.freedom, machine.body, machine.cables, _locked_view(lengths), _locked_view(poses), NO_LOAD),
         machine.sensing,
-        PoseReadings(*map(_locked_view, readings)),
+        PoseReadings(*map(_locked_view, readings[:4])),
         (where, locked(np.where(parameters.where >= 0, factor[parameters.where], 0.0)), _locked_view(slopes)),
         memory_for(m),
         (*found[:5], np.empty((rows + 6, width))),
@@ -318,10 +325,8 @@ def predicted_rows(
 ) -> WhitenedRows:
     """Whitened slopes of the readings at equilibria with pose rows `poses` and unstrained lengths (N, m) [m]."""
     # frequencies: (N, K), NaN where no slopes are wanted, or None.
-    more = machine.sensors.swivel_deviation is not None or frequencies is not None
-    further = FurtherReadings(None, frequencies) if more else None
-    slopes, readings = machine.winch_slopes(lengths), _no_readings(lengths)
-    rows = whitened_rows(machine, readings, slopes, poses, lengths, further=further)
+    readings = _no_readings(lengths)._replace(frequencies=frequencies)
+    rows = whitened_rows(machine, readings, machine.winch_slopes(lengths), poses, lengths)
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
 

@@ -13,7 +13,6 @@ from scipy.special import chdtrc, gammaln
 
 from sagline.calibration import observations
 from sagline.calibration.findings import QUANTITIES, Outlier
-from sagline.calibration.further import FurtherReadings
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
 from sagline.calibration.parameters import Unknown, parameters_of
@@ -21,7 +20,6 @@ from sagline.calibration.problem import FitProblem, SearchState
 from sagline.calibration.straight import lines_at
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels import codes
-from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 
 CHANCE: Final = 0.01  # probability that a log without errors has an outlier by chance
@@ -58,17 +56,15 @@ class _Case(NamedTuple):
 
     machine: observations.MachineTerms  # the robot with sensors in SI units
     deviation: Array  # standard deviations of lengths and readings, (2 m + 6,)
-    readings: PoseReadings  # readings at the pose, one row
+    readings: observations.Readings  # readings at the pose, one row
     pose: Array  # pose row, (1, POSE_COLUMNS)
     lengths: Array  # true lengths [m], (1, m)
     read: Flags  # flags of the available readings, (m + 6,)
-    further: FurtherReadings | None  # readings that the kernel does not know; (m,) more of all arrays of readings
 
     @property
     def modes(self) -> int:
         """Number of natural frequencies."""
-        given = None if self.further is None else self.further.frequencies
-        return 0 if given is None else given.shape[1]
+        return 0 if self.readings.frequencies is None else self.readings.frequencies.shape[1]
 
     def misses(self) -> tuple[Array, Array]:
         """Misfits (2 m + 6,) of lengths and readings, and derivatives (m + 6, m) of readings by true lengths."""
@@ -81,9 +77,7 @@ class _Case(NamedTuple):
             off[there], by_pose[there] = lines.residual[0], lines.by_pose[0]
             return off, by_pose
         slopes = np.zeros((observations.SLOPES, 1, self.lengths.shape[1]))
-        rows = observations.whitened_rows(
-            self.machine, self.readings, slopes, self.pose, self.lengths, further=self.further
-        )
+        rows = observations.whitened_rows(self.machine, self.readings, slopes, self.pose, self.lengths)
         off = np.concatenate((self.readings.lengths[0] - self.lengths[0], rows.residual[0]))
         return off, rows.back[0].T / observations.EXACT**2
 
@@ -191,8 +185,8 @@ def outliers_in(
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)
-        readings = PoseReadings(reported[one], log.cells[one], log.positions[one], log.rotations[one])
-        case = _Case(exactly, deviation, readings, state.poses[one], state.lengths[one], read[k], problem.further(one))
+        readings = problem.readings(reported[one], one)
+        case = _Case(exactly, deviation, readings, state.poses[one], state.lengths[one], read[k])
         found += _outliers_at(case, row, count)
     return tuple(found)
 

@@ -15,7 +15,7 @@ from sagline.calibration.log import Sensors, measures_yaw
 from sagline.core.arguments import choice, elements, flag, instance
 from sagline.core.arrays import Array, Flags, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import Result
+from sagline.core.results import Result, set_fields
 from sagline.kernels.calibration import kinds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot, with_quantities
@@ -101,13 +101,13 @@ class Unknown:
         Raises:
             InvalidValueError: If `KINDS` does not contain `name`, or `deviation` is not positive.
         """
-        object.__setattr__(self, "name", str(choice(self.name, "unknown", KINDS)))
+        set_fields(self, name=str(choice(self.name, "unknown", KINDS)))
         if self.shared is not None:
-            object.__setattr__(self, "shared", flag(self.shared, f"{self.name}: shared"))
+            set_fields(self, shared=flag(self.shared, f"{self.name}: shared"))
         if self.deviation is not None:
             item, unit = f"{self.name}: deviation", KINDS[self.name].unit
             deviation = exactly(self.deviation, item, unit, (), above=0.0, infinite=True)
-            object.__setattr__(self, "deviation", float(deviation))
+            set_fields(self, deviation=float(deviation))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
-from sagline.calibration.further import FurtherReadings, circular_mean, swivel_angles
+from sagline.calibration.further import circular_mean, swivel_angles
 from sagline.calibration.log import Sensors, WinchLog, load_cells_of, measures_yaw
-from sagline.calibration.observations import NO_LOAD, MachineTerms, WhitenedRows, lengths_at_counts
+from sagline.calibration.observations import NO_LOAD, MachineTerms, Readings, WhitenedRows, lengths_at_counts
 from sagline.calibration.parameters import Parameters, sensors_with, with_values
 from sagline.calibration.straight import lines_at
 from sagline.core.arrays import Array, Flags, locked
 from sagline.kernels import codes
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.observe import starting_lengths
-from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward import centered_positions, search
 from sagline.robot.pose import Pose
@@ -86,16 +85,11 @@ class FitProblem(NamedTuple):
         """True for straight cables: poses are fitted to lengths, without a force balance."""
         return self.model.code == codes.STRAIGHT
 
-    def readings(self, reported: Array, part: slice) -> PoseReadings:
+    def readings(self, reported: Array, part: slice) -> Readings:
         """Readings at the poses `part` with the reported lengths `reported` (n, m) [m]."""
-        return PoseReadings(reported, self.log.cells[part], self.log.positions[part], self.log.rotations[part])
-
-    def further(self, part: slice) -> FurtherReadings | None:
-        """Readings at the poses `part` that the kernel does not know; None without such readings."""
-        given = self.log.swivels, self.log.frequencies
-        if all(read is None for read in given):
-            return None
-        return FurtherReadings(*(None if read is None else read[part] for read in given))
+        log = self.log
+        further = (None if read is None else read[part] for read in (log.swivels, log.frequencies))
+        return Readings(reported, log.cells[part], log.positions[part], log.rotations[part], *further)
 
     @property
     def scale(self) -> Array:

@@ -13,12 +13,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sagline.calibration.log import measures_yaw, reading_deviations
-from sagline.calibration.observations import MachineTerms, WhitenedRows
+from sagline.calibration.observations import MachineTerms, Readings, WhitenedRows
 from sagline.core.arrays import Array, Flags
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.terms import PoseReadings
 from sagline.robot.robot import Robot
 
 ITERATIONS: Final = 40  # of the fit of a pose; a good start needs three
@@ -42,7 +41,7 @@ class _Lines(NamedTuple):
     wrap: Array  # wrap angles minus their sines: derivatives of the lengths by the pulley radius, (N, m)
 
 
-def lines_at(machine: MachineTerms, readings: PoseReadings, poses: Array) -> _Lines:
+def lines_at(machine: MachineTerms, readings: Readings, poses: Array) -> _Lines:
     """Straight cables and residuals at pose rows (N, POSE_COLUMNS)."""
     robot, sensors, cables = machine.robot, machine.sensors, machine.cables[0]
     count, m = len(poses), robot.cable_count
@@ -92,7 +91,7 @@ def _weights(machine: MachineTerms, lines: _Lines) -> Array:
     return np.where(used, 1.0 / _deviations(machine), 0.0)
 
 
-def rotation_error(machine: MachineTerms, readings: PoseReadings, poses: Array) -> float:
+def rotation_error(machine: MachineTerms, readings: Readings, poses: Array) -> float:
     """Standard error of the rotation at a typical pose, about the axis with the largest error [rad]."""
     free = machine.robot.freedom
     if not (turns := free[:, 3:].any(axis=1)).any():
@@ -128,7 +127,7 @@ class _Fitted(NamedTuple):
         return np.asarray(np.einsum("nk,nkj,ji->ni", along, self.right, free))
 
 
-def _fitted_at(machine: MachineTerms, readings: PoseReadings, poses: Array) -> _Fitted:
+def _fitted_at(machine: MachineTerms, readings: Readings, poses: Array) -> _Fitted:
     lines = lines_at(machine, readings, poses)
     weights = _weights(machine, lines)
     whole = np.where(np.isfinite(lines.by_pose), lines.by_pose, 0.0) * weights[..., None]
@@ -139,7 +138,7 @@ def _fitted_at(machine: MachineTerms, readings: PoseReadings, poses: Array) -> _
     return _Fitted(lines, left, sizes, right, misfit, np.where(lost, np.inf, np.sum(misfit**2, axis=1)))
 
 
-def fit_poses(machine: MachineTerms, readings: PoseReadings, poses: Array) -> tuple[Array, Array]:
+def fit_poses(machine: MachineTerms, readings: Readings, poses: Array) -> tuple[Array, Array]:
     """Pose rows with the least squares of all readings, and their lengths (N, m) [m] (Levenberg-Marquardt)."""
     robot, poses = machine.robot, poses.copy()
     best, damping = _fitted_at(machine, readings, poses), np.zeros(len(poses))
@@ -200,7 +199,7 @@ def _by_cable(lines: _Lines, along: Array, reported: Array) -> Iterator[tuple[in
     yield kinds.DEAD, np.ones(lines.wrap.shape)
 
 
-def straight_rows(machine: MachineTerms, readings: PoseReadings, reported: Array, poses: Array) -> WhitenedRows:
+def straight_rows(machine: MachineTerms, readings: Readings, reported: Array, poses: Array) -> WhitenedRows:
     """Whitened rows at the poses; zero along the directions that the pose explains, which are eliminated."""
     # reported: derivatives of reported lengths (5, N, m) from `winch_slopes`. `back` are the directions of the rows,
     # (N, m + 6, m + 6), and `motion` is empty.
@@ -232,7 +231,7 @@ def whitened_errors(
     off = np.delete(residuals, slice(m, 2 * m), axis=1)
     there = np.where(np.isnan(off), np.nan, 0.0)  # the slopes depend only on which readings exist
     level = np.fmax.reduce(there[:, m + 3 :], axis=1)[:, None] + np.array([0.0, 0.0, 0.0, 1.0])
-    readings = PoseReadings(there[:, :m], np.full((count, m), np.nan), there[:, m : m + 3], level)
+    readings = Readings(there[:, :m], np.full((count, m), np.nan), there[:, m : m + 3], level)
     rows = straight_rows(machine, readings, reported, poses)
     noise = np.swapaxes(rows.back, 1, 2) * ~np.isnan(off)[:, None]
     misfit = np.einsum("nij,nj->ni", noise, np.nan_to_num(off / _deviations(machine)))
@@ -243,7 +242,7 @@ def whitened_errors(
 def slopes_of_poses(machine: MachineTerms, reported: Array, poses: Array) -> tuple[Array, Array]:
     """Derivatives of position and rotation by the unknowns (N, 6, P) and by the lengths (N, 6, m) that fit the pose."""
     count, m = len(poses), machine.robot.cable_count
-    nothing = PoseReadings(*(np.full((count, width), np.nan) for width in (m, m, 3, 4)))
+    nothing = Readings(*(np.full((count, width), np.nan) for width in (m, m, 3, 4)))
     lines = lines_at(machine, nothing, poses)
     slopes = _slopes(machine, lines, reported)
     by_length = lines.by_pose[:, m:] @ np.linalg.pinv(lines.by_pose[:, :m])

@@ -37,7 +37,7 @@ def documented_units(kind: type[Any], name: str) -> list[str]:
     return [" ".join(unit.split()) for unit in re.findall(r"\s\[([^\[\]]+)\]", text or "")]
 
 
-def set_fields(target: object, **values: Any) -> None:
+def set_fields(target: object, /, **values: Any) -> None:
     """Set fields of the frozen object `target`; only constructors call this function."""
     for name, value in values.items():
         object.__setattr__(target, name, value)

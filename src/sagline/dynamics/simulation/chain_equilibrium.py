@@ -47,8 +47,7 @@ class _LumpedCables(NamedTuple):
         unit = forces / size[..., None]
         across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
         along = self.nodes / self.stiffness[:, None, None] * np.eye(3)
-        compliance: Array = self.element[:, None, None] * (along + (across / size[..., None, None]).sum(axis=1))
-        return compliance
+        return np.asarray(self.element[:, None, None] * (along + (across / size[..., None, None]).sum(axis=1)))
 
 
 def chains_at_rest(state: Equilibrium, nodes: int) -> tuple[Pose, Array, Array]:

@@ -48,8 +48,7 @@ class _LoadedPlatform:
 
     def levers(self, ends: Array) -> Array:
         """Positions on the platform (m, 3) relative to the center of the whole body, in the axes of the whole body."""
-        levers: Array = (ends - self.center) @ self.axes
-        return levers
+        return np.asarray((ends - self.center) @ self.axes)
 
     def state(self, place: Array, turning: Array, velocity: Array, spin: Array) -> Array:
         """State row of the whole body, computed from pose and velocity of the platform."""
@@ -71,15 +70,13 @@ class _LoadedPlatform:
     def spin(self, state: Array) -> Array:
         """Angular velocity in a state of the whole body, world axes [rad/s], (3,)."""
         axes = Rotation.from_quat(state[body.TURN : body.VELOCITY]).as_matrix()
-        spin: Array = axes @ ((axes.T @ state[body.MOMENTUM :]) / self.inertia[1:])
-        return spin
+        return np.asarray(axes @ ((axes.T @ state[body.MOMENTUM :]) / self.inertia[1:]))
 
 
 def _about(masses: Array, places: Array) -> Array:
     """Inertia about the origin of the point masses `masses` (m,) at `places` (m, 3)."""
     squares = (places * places).sum(axis=1)
-    inertia: Array = (masses * squares).sum() * np.eye(3) - (masses[:, None] * places).T @ places
-    return inertia
+    return np.asarray((masses * squares).sum() * np.eye(3) - (masses[:, None] * places).T @ places)
 
 
 FEWEST, MOST = 4, 500  # elements per cable
@@ -246,8 +243,7 @@ class ChainPlant(Plant):
     def _lengths_of(self, rows: Indices) -> Array:
         """Unstrained lengths of chains [m]."""
         table, counts = self._chains[0], self._chains[4]
-        lengths: Array = counts[rows] * table[rows, c.ELEMENT] + table[rows, c.REST]
-        return lengths
+        return np.asarray(counts[rows] * table[rows, c.ELEMENT] + table[rows, c.REST])
 
     def _release_platform_end(self, i: int, cable: int) -> None:
         """Give the half element at the platform, which moves with the platform, to the piece in row `i`."""
@@ -268,8 +264,7 @@ class ChainPlant(Plant):
     def _platform_motion(self) -> Array:
         """State of the platform, with angular velocity, (13,)."""
         moving = np.concatenate((self.state[: body.MOMENTUM], self._carrier.spin(self.state)))
-        motion: Array = self._carrier.platform_states(moving[None])[0]
-        return motion
+        return np.asarray(self._carrier.platform_states(moving[None])[0])
 
     def _change_body(self, own: Array) -> None:
         """Set the whole body for the present masses; `own` (13,): state of the platform, with angular velocity."""

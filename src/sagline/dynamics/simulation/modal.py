@@ -185,5 +185,4 @@ def _shapes(state: Equilibrium, found: Vibration, amplitude: Array) -> Array:
     level = chord[:, :2] / np.maximum(np.hypot(chord[:, 0], chord[:, 1]), 1e-300)[:, None]
     own = state.cables.points(count)
     at_rest = np.concatenate((own[..., :1] * level[:, None], own[..., 1:]), axis=-1) + state.exit_point[:, None]
-    shapes: Array = at_rest + np.tensordot(amplitude, found.cable_shape, axes=1)
-    return shapes
+    return np.asarray(at_rest + np.tensordot(amplitude, found.cable_shape, axes=1))

@@ -226,8 +226,7 @@ def fastest_rates(robot: Robot, length: Array) -> Array:
     assert winch is not None
     assert winch.speed_limit is not None
     stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
-    rates: Array = np.abs(winch.speed_limit / winch.gear) * drum_lever(robot, length) / stretch
-    return rates
+    return np.asarray(np.abs(winch.speed_limit / winch.gear) * drum_lever(robot, length) / stretch)
 
 
 def _speed_excess(plan: Plan) -> float:

@@ -15,7 +15,7 @@ from sagline.core.arguments import instance
 from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.core.results import Result
+from sagline.core.results import Result, set_fields
 from sagline.dynamics.trajectories.segments import RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.motion.path import Path, checked_time
 
@@ -62,9 +62,7 @@ class Shaper(Result):
         if shares.shape != clock.shape or abs(shares.sum() - 1.0) > _ROUNDING:
             value = f"{shares.size} that sum to {shares.sum():.9g}"
             raise InvalidValueError("amplitude", value, f"{clock.size} that sum to 1", "Divide them by their sum.")
-        object.__setattr__(self, "time", clock)
-        object.__setattr__(self, "amplitude", shares)
-        object.__setattr__(self, "frequency", _frequencies(frequency))
+        set_fields(self, time=clock, amplitude=shares, frequency=_frequencies(frequency))
 
     @property
     def duration(self) -> float:
@@ -116,8 +114,7 @@ class Shaper(Result):
         ratio = _damping_ratio(damping_ratio)
         before = self.time - self.time[-1]
         damped = np.exp(ratio * turning * before) * np.exp(1j * turning * np.sqrt(1.0 - ratio**2) * before)
-        left: Array = locked(np.asarray(np.abs(damped @ self.amplitude)))
-        return left
+        return locked(np.asarray(np.abs(damped @ self.amplitude)))
 
 
 def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802

@@ -76,8 +76,7 @@ def flexibility(state: Equilibrium, force: Array) -> Flexibility:
 
     def world(matrix: Array) -> Array:
         held = np.where(slack[..., None, None], 0.0, matrix)
-        turned: Array = np.swapaxes(axes, -1, -2) @ held @ axes
-        return turned
+        return np.asarray(np.swapaxes(axes, -1, -2) @ held @ axes)
 
     by_force = np.where(slack[..., None, None, None], 0.0, by_force)
     return Flexibility(
@@ -106,8 +105,7 @@ def _turning(h: Array, v: Array, size: Array) -> Array:
     """Matrix (1 - t t^T)/N for the force (h, 0, v), shape (..., 3, 3)."""
     force = np.stack((h, np.zeros_like(h), v), axis=-1)
     unit = force / size[..., None]
-    found: Array = (np.eye(3) - unit[..., :, None] * unit[..., None, :]) / size[..., None, None]
-    return found
+    return np.asarray((np.eye(3) - unit[..., :, None] * unit[..., None, :]) / size[..., None, None])
 
 
 def _by_force(hung: _CatenaryState) -> Array:

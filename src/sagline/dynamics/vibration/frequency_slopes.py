@@ -165,5 +165,4 @@ def _parting(form: Array, frequency: Array) -> Array:
     known: Flags = np.asarray(np.isfinite(form).all(axis=(-1, -2)))
     squares = np.linalg.eigvalsh(np.where(known[..., None, None], form, 0.0))
     squares = np.where(known[..., None], squares, np.nan)
-    slopes: Array = np.moveaxis(squares, -1, 0) / (8.0 * np.pi**2 * frequency.mean())
-    return slopes
+    return np.asarray(np.moveaxis(squares, -1, 0) / (8.0 * np.pi**2 * frequency.mean()))

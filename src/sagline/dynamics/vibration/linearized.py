@@ -221,5 +221,4 @@ def _modal_drag(state: Equilibrium, ratio: float) -> Array:
     """Damping matrix (6, 6) of the platform that gives every stable massless mode the damping ratio `ratio`."""
     found, mass = modes(state), mass_matrix(state)
     momenta = mass @ found.shape
-    drag: Array = momenta * (2.0 * ratio * 2.0 * np.pi * np.nan_to_num(found.frequency)) @ momenta.T
-    return drag
+    return np.asarray(momenta * (2.0 * ratio * 2.0 * np.pi * np.nan_to_num(found.frequency)) @ momenta.T)

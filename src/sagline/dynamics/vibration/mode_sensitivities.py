@@ -90,8 +90,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
     for k, cross in enumerate(np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), -1, -2)):
         form[3 + k] -= swings.square * turns.T @ (cross @ inertia - inertia @ cross) @ turns
     freedom = rest.state.one_robot.freedom
-    kept: Array = np.einsum("kj,jab->kab", freedom.T @ freedom, form)
-    return kept
+    return np.asarray(np.einsum("kj,jab->kab", freedom.T @ freedom, form))
 
 
 def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
@@ -100,8 +99,7 @@ def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
     along, pulled = levers @ turns, force @ turns
     mixed = along[..., :, None] * pulled[..., None, :]
     pressed = np.sum(levers * force, axis=-1)[..., None, None] * (turns.T @ turns)
-    form: Array = 0.5 * (mixed + np.swapaxes(mixed, -1, -2)) - pressed
-    return form
+    return np.asarray(0.5 * (mixed + np.swapaxes(mixed, -1, -2)) - pressed)
 
 
 PHASE = 0.45 * np.pi  # largest phase of a transverse wave in an element [rad]
@@ -221,8 +219,7 @@ def _flexible(force: Array, stiffness: float) -> Array:
     """Flexibility per length C at points of the cable with given forces (..., 3), shape (..., 3, 3)."""
     size = np.linalg.norm(force, axis=-1)[..., None, None]
     tangent = force[..., :, None] * force[..., None, :] / size**2
-    found: Array = np.eye(3) / stiffness + (np.eye(3) - tangent) / size
-    return found
+    return np.asarray(np.eye(3) / stiffness + (np.eye(3) - tangent) / size)
 
 
 def _edges(cable: _StringData, omega: float) -> Array:
@@ -274,5 +271,4 @@ def _turned(force: Array, pulled: Array) -> Array:
     mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # along[a] times each component of pulled[b]
     straight = 3.0 * along[:, :, None] * along[:, None, :] / size**2 - both
     turned = straight[..., None] * force[:, None, None, :] - mixed - np.swapaxes(mixed, 1, 2)
-    found: Array = turned / size[..., None] ** 3
-    return found
+    return np.asarray(turned / size[..., None] ** 3)

@@ -68,8 +68,7 @@ def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape
     force = inertial_wrench(robot, jet.pose, twist, twist_rate) @ shape  # modal force of each mode over time
     turning = 2.0 * np.pi * frequency
     transform = np.trapezoid(force * np.exp(-1j * np.outer(time, turning)), time, axis=0)
-    seen: Array = np.abs(transform) * np.linalg.norm(shape, axis=0) / turning
-    return seen
+    return np.asarray(np.abs(transform) * np.linalg.norm(shape, axis=0) / turning)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
