@@ -91,11 +91,11 @@ class Off(ActiveState):
     def leave(self, sample: Sample | None) -> None:
         """Send the command LEAVE while the controller owns a group."""
         self._cycles = max(self._cycles - 1, 0)
-        if self._cycles and (sample is None or bool((sample.owner == self.context.owner).any())):
+        if self._cycles and (sample is None or bool((sample.owner == self.context.sender.owner).any())):
             self.rest(Mode.LEAVE, enabled=False)
         else:
             self.point = None
-            self.context.sender.nothing()
+            self.context.sender.command = None
 
 
 class Connecting(ActiveState):
@@ -105,7 +105,7 @@ class Connecting(ActiveState):
         """Begin to claim all groups."""
         context.enter(State.CONNECTING, "claims the groups")
         super().__init__(context)
-        self.claim = Claim(context.owner, context.link.groups, context.period, context.random)
+        self.claim = Claim(context.sender.owner, context.link.groups, context.period, context.random)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
         """Change to READY if all groups agree, or to OFF if the claim fails."""
@@ -118,7 +118,7 @@ class Connecting(ActiveState):
         if claim.refused is not None:
             return Off(c, claim.refused.reason).next(answer)
         if claim.mode is None:
-            c.sender.nothing()
+            c.sender.command = None
         else:
             self.rest(claim.mode, enabled=False)
         return self

@@ -36,10 +36,6 @@ class Sender:
         enable = self._enabled if enabled else self._disabled
         self._send(mode, self.length, np.zeros(len(self.length)), self.tension, enable, claims)
 
-    def nothing(self) -> None:
-        """Send no command in the next cycle."""
-        self.command = None
-
     def stand_at(self, sample: link.Sample | None, tension: Array | None = None) -> None:
         """Store the lengths of `sample` and the tensions at rest [N], (m,): `tension`, or filtered readings if None."""
         if sample is not None:

@@ -160,11 +160,6 @@ class Context:
         self.clear_faults()
         self.reset_tension_loop()
 
-    @property
-    def owner(self) -> int:
-        """Id of the controller."""
-        return self.sender.owner
-
     # events
 
     def say(self, kind: EventKind, name: str, text: str) -> None:
@@ -189,7 +184,7 @@ class Context:
         """Newest sample of the machine. If a group does not agree, the error names the refused request `what`."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
-        why, _ = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
+        why, _ = disagreement(self.sample, self.sender.owner, self.sender.counter, self.link.groups, self.period)
         if why is not None:
             raise RefusedError(what, *why)
         return self.sample

@@ -65,7 +65,7 @@ class Preparation:
     @property
     def owner(self) -> int:
         """Id of the controller."""
-        return self._context.owner
+        return self._context.sender.owner
 
     @property
     def degraded(self) -> bool:

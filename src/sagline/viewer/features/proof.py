@@ -10,6 +10,7 @@ import numpy as np
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.slopes import platform_end_forces
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import css_color, html_block, sentence, swatch
@@ -33,21 +34,12 @@ class _PlatformForce:
     at: Array  # point at which it acts [m], shape (3,)
 
 
-def forces_of_cables(state: Equilibrium) -> Array:
-    """Forces of the cables on the platform [N], shape (m, 3), along the tangents of their platform ends."""
-    back = (state.exit_point - state.pose.transform(state.one_robot.platform_anchors))[:, :2]
-    far = np.linalg.norm(back, axis=1, keepdims=True)
-    level = np.divide(back, far, out=np.zeros_like(back), where=far > 0.0)
-    cables = state.cables
-    return np.column_stack((level * cables.horizontal_tension[:, None], -cables.vertical_force))
-
-
 def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tuple[_PlatformForce, ...]:
     """All forces on a platform: those of the cables in order of azimuth, then weight, load and missing force."""
     robot, pose = state.one_robot, state.pose
     center = pose.transform(robot.center_of_mass)
     ends = pose.transform(robot.platform_anchors)
-    pulls = forces_of_cables(state)
+    pulls = -platform_end_forces(state)  # forces of the cables on the platform
     order = np.argsort(np.arctan2(pulls[:, 1], pulls[:, 0]), kind="stable").tolist()
     wrenches = np.hstack((pulls, np.cross(ends - center, pulls)))
     forces = [_PlatformForce(str(k), cable_color(k), wrenches[k], ends[k]) for k in order]

@@ -361,13 +361,10 @@ class TensionsFeature(Feature):
                 return
             at = self._aim + np.clip(by[: field.redundant], -FARTHEST, FARTHEST) * float(np.max(field.high - field.low))
         self._aim = field.nearest(at)
-        self._panel.choose_by_hand(ByHand(target=field.tension(self._aim + self._beyond(field, at - self._aim))))
-
-    @staticmethod
-    def _beyond(field: DotField, away: Array) -> Array:
-        """Small step outward, because the sides are slightly farther with other sag forces."""
-        far = float(np.linalg.norm(away))
-        return away * min(1.0, OVER * float(np.max(field.high - field.low)) / far) if far > 0.0 else away
+        away = at - self._aim
+        if (far := float(np.linalg.norm(away))) > 0.0:  # a step outward: other sag forces move the sides slightly
+            away *= min(1.0, OVER * float(np.max(field.high - field.low)) / far)
+        self._panel.choose_by_hand(ByHand(target=field.tension(self._aim + away)))
 
     def _on_method(self, value: Any, _: int) -> None:
         if self._field is not None and isinstance(value, str) and value in METHODS:
