@@ -61,7 +61,7 @@ _AGAIN: Final = "Try again; if this continues, check the program of the PLC."
 
 
 def disagreement(
-    sample: link.Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = link.PERIOD
+    sample: link.Sample, owner: int, counter: int, groups: link.Groups, period: float = link.PERIOD
 ) -> tuple[link.Refusal | None, bool]:
     """First reason why a group does not agree, and True if the operator must act. (None, False) if all groups agree."""
     # A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not
@@ -99,9 +99,7 @@ def disagreement(
 class Claim:
     """Claim of the ownership of all groups."""
 
-    def __init__(
-        self, owner: int, groups: tuple[tuple[int, ...], ...], period: float, random: np.random.Generator
-    ) -> None:
+    def __init__(self, owner: int, groups: link.Groups, period: float, random: np.random.Generator) -> None:
         """Begin the claim for cycles of `period` [s]."""
         self._owner, self._groups, self._period, self._random = owner, groups, period, random
         self._silent = self._cycles = self._agreed = 0

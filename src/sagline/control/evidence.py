@@ -9,7 +9,7 @@ from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import RAMP, Command, Mode, Sample, WinchState, groups_of
+from sagline.control.link import RAMP, Command, Groups, Mode, Sample, WinchState, groups_of
 from sagline.control.null_space import SIGMAS, NullSpace, extrema, finite, largest
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
@@ -60,12 +60,7 @@ class Evidence:
     """Tensions of this cycle and data of the machine, used by all rules of a set."""
 
     def __init__(
-        self,
-        robot: Robot,
-        period: float,
-        groups: tuple[tuple[int, ...], ...] | None,
-        cell: tuple[float, float],
-        largest: float,
+        self, robot: Robot, period: float, groups: Groups | None, cell: tuple[float, float], largest: float
     ) -> None:
         """Begin without readings. `period` [s]. `cell`: deviation, bias [N]. `largest`: limit of a correction [m]."""
         m, winch = robot.cable_count, robot.winches

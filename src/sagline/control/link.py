@@ -12,6 +12,7 @@ from sagline.core.arrays import Array, Flags
 from sagline.core.results import Status
 
 Whole: TypeAlias = NDArray[np.int64]
+Groups: TypeAlias = tuple[tuple[int, ...], ...]  # winches of each group, from 0
 
 PERIOD: Final = 0.01  # period of the controller's cycle [s]; the article uses 100 samples per second
 GROUP_SIZE: Final = 2  # number of winches per PLC
@@ -228,7 +229,7 @@ def no_news(counter: int, known: int) -> Refusal:
     return Refusal(f"it is older than the previous block: its counter is {counter} after {known}", step)
 
 
-def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:
+def groups_of(cable_count: int) -> Groups:
     """Winches of each group: two neighboring winches have one PLC, and the last winch may be alone."""
     winches = range(cable_count)
     return tuple(tuple(winches[i : i + GROUP_SIZE]) for i in range(0, cable_count, GROUP_SIZE))
