@@ -11,15 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sagline.cables.models import models_by_name
-from sagline.calibration.findings import (
-    QUANTITIES,
-    CalibrationStatus,
-    Criticism,
-    CrossValidation,
-    Direction,
-    Omission,
-    Outlier,
-)
+from sagline.calibration import findings
 from sagline.calibration.log import Sensors
 from sagline.calibration.parameters import KINDS, Parameters
 from sagline.calibration.result import Calibration
@@ -63,7 +55,7 @@ READINGS: Final = "lengths [m], load cells [N], position [m], rotation [rad], sw
 OLDEST: Final = 27  # number of kinds in the oldest files
 FOUND: Final = (
     Quantity("length_offset", ("cable",), "m", "correction of the lengths of the machine"),
-    Quantity("status", (), "", "status of the calibration", codes=CalibrationStatus),
+    Quantity("status", (), "", "status of the calibration", codes=findings.CalibrationStatus),
     Quantity("value", P, "", "estimated values, in the units of the parameters", "values"),
     Quantity("covariance", (*P, "other_parameter"), "", "covariance of the values", known=SOMEWHERE, infinite=True),
     Quantity("chi_squared", (), "1", "sum of squares of the normalized residuals", low=0.0),
@@ -94,7 +86,7 @@ PLACED: Final = (
 )
 LEFT_OUT: Final = (
     Quantity("left_out_row", ("omission",), "", "omitted rows of the log", values=int),
-    Quantity("left_out_reason", ("omission",), "", "reason of the omission", codes=Omission),
+    Quantity("left_out_reason", ("omission",), "", "reason of the omission", codes=findings.Omission),
 )
 OUTLIERS: Final = (
     Quantity("outlier_row", ("outlier",), "", "row of the log", "row", values=int),
@@ -159,7 +151,7 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
     words: dict[str, Iterable[str]] = {
         "parameter_name": KINDS,
         "parameter_unit": UNITS,
-        "outlier_quantity": QUANTITIES,
+        "outlier_quantity": findings.QUANTITIES,
         "criticism_kind": KINDS,
         "criticism_moves": data.variables["parameter_label"].values.tolist(),
     }
@@ -169,10 +161,10 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
     choice(str(data.attrs["read"]), "read", READ)
     for name in ("log", "date"):
         text(data.attrs[name], name)
-    names = [reason.name.lower() for reason in Omission]
+    names = [reason.name.lower() for reason in findings.Omission]
     reasons = [choice(word, "left_out", names) for word in text(data.attrs["left_out"], "left_out").split()]
     for code in np.unique(data.variables["left_out_reason"].values).tolist():
-        choice(Omission(code).name.lower(), "left_out_reason", reasons)
+        choice(findings.Omission(code).name.lower(), "left_out_reason", reasons)
 
 
 def load_calibration(file: os.PathLike[str] | str) -> Calibration:
@@ -253,24 +245,24 @@ def _unpack(path: Path, data: Dataset) -> Calibration:
     numbers["where"] = locked(np.pad(numbers["where"], missing, constant_values=-1))
     texts: dict[str, Any] = {name: tuple(numbers.pop(name).tolist()) for name in ("names", "labels", "units")}
     texts["units"] = tuple("" if unit == "1" else unit for unit in texts["units"])
-    omissions = [Omission[name.upper()] for name in data.attrs["left_out"].split()]
+    omissions = [findings.Omission[name.upper()] for name in data.attrs["left_out"].split()]
     rows, reasons = (data[one.name].values for one in LEFT_OUT)
     checked = {one.place: data[one.name].values.item() for one in CROSS_VALIDATION if "folds" in data.variables}
+    criticisms = CRITICISMS if CRITICISMS[0].name in data.variables else ()
     directions: dict[str, Any] = {
-        name: tuple(Direction(**row) for row in v.records_of(data, columns)) for name, columns in DIRECTIONS.items()
+        name: tuple(findings.Direction(**row) for row in v.records_of(data, columns))
+        for name, columns in DIRECTIONS.items()
     }
     return Calibration(
         robot=robot,
         before=before,
         sensors=Sensors(**placed | {"frame": Pose._adopt(**placed["frame"])}),
         parameters=Parameters(**numbers, **texts, counted=READ.index(data.attrs["read"]) == 1),
-        **found | {"status": CalibrationStatus(found["status"]), "poses": Pose._adopt(**found["poses"])},
+        **found | {"status": findings.CalibrationStatus(found["status"]), "poses": Pose._adopt(**found["poses"])},
         left_out={reason: locked(rows[reasons == reason.value]) for reason in omissions},
-        outliers=tuple(Outlier(**row) for row in v.records_of(data, OUTLIERS)),
-        criticisms=tuple(
-            Criticism(**row) for row in v.records_of(data, CRITICISMS if CRITICISMS[0].name in data.variables else ())
-        ),
-        cross_validation=CrossValidation(**checked) if checked else None,
+        outliers=tuple(findings.Outlier(**row) for row in v.records_of(data, OUTLIERS)),
+        criticisms=tuple(findings.Criticism(**row) for row in v.records_of(data, criticisms)),
+        cross_validation=findings.CrossValidation(**checked) if checked else None,
         **directions,
         model=choice_of(path, data.attrs, "model", models_by_name()),
         log=str(data.attrs["log"]),

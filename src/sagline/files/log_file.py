@@ -17,19 +17,12 @@ from sagline.core.arguments import file_path, instance, optional
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import FileError, did_you_mean
 from sagline.core.fields import units
+from sagline.files import table as tables
 from sagline.files.log_columns import ARRAYS, ColumnEntry, log_text
 from sagline.files.path_file import EULER, QUATERNION
 from sagline.files.pose_text import PoseEntry
 from sagline.files.reading import read_text, value_errors
-from sagline.files.table import (
-    TABLE_LIMIT,
-    CsvTable,
-    column_of_cable,
-    line_error,
-    lines_above_header,
-    names_of_cables,
-    separator_of,
-)
+from sagline.files.table import CsvTable, line_error
 from sagline.files.writing import write_text
 from sagline.files.yaml_text import YAML_LIMIT, parse_mapping, schema_of, validate
 from sagline.robot.pose import Pose
@@ -86,7 +79,7 @@ class _LogMap(_Sensors):
 def _sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
     """Sensors from the comments above the header, and the text without these comments."""
     lines = text.split("\n")
-    count = lines_above_header(lines)
+    count = tables.lines_above_header(lines)
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
     rows = "\n".join([""] * count + lines[count:])
     if not any(said):
@@ -122,8 +115,8 @@ def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
 def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     """Read the table and the number of its cables."""
     header = next((line for line in text.split("\n") if line.strip()), "")
-    cells = [cell.partition("[")[0].strip() for cell in header.replace('"', "").split(separator_of(text))]
-    found = [_NUMBERED.fullmatch(column_of_cable(cell)) for cell in cells]
+    cells = [cell.partition("[")[0].strip() for cell in header.replace('"', "").split(tables.separator_of(text))]
+    found = [_NUMBERED.fullmatch(tables.column_of_cable(cell)) for cell in cells]
     lengths = [match for match in found if match and match[1] in ("count", "length")]
     cables = max((min(int(match[2]), _MOST - 1) + 1 for match in lengths), default=1)
     optional_units = {f"{kind}_{k}": _OF_CABLE[kind] for k in range(cables) for kind in _BESIDE}
@@ -133,11 +126,11 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     commanded = {f"{name}{COMMANDED}": optional_units[name] for name in _POSE_COLUMNS}
     units = {"time": "s", **readings, **optional_units, **commanded}
     table = CsvTable.read(path, text, units, gaps=frozenset((*readings, *optional_units)))
-    kinds = [kind for kind in ("count", "length") if table.columns.keys() & set(names_of_cables(kind, cables))]
+    kinds = [kind for kind in ("count", "length") if table.columns.keys() & set(tables.names_of_cables(kind, cables))]
     if len(kinds) != 1:
         what = "columns of counts and of lengths" if kinds else "neither columns count_0, ... nor length_0, ..."
         raise line_error(path, table.header, f"{what}; allowed: one of the two")
-    if missing := [name for name in names_of_cables(kinds[0], cables) if name not in table.columns]:
+    if missing := [name for name in tables.names_of_cables(kinds[0], cables) if name not in table.columns]:
         shown = ", ".join(missing[:3]) + (", ..." if len(missing) > 3 else "")
         raise line_error(path, table.header, f"missing column {shown}; the last is {kinds[0]}_{cables - 1}")
     table.check_rows()
@@ -146,10 +139,10 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
 
 def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
     return {
-        "counts": _stack_columns(table, names_of_cables("count", cables)),
-        "unstrained_length": _stack_columns(table, names_of_cables("length", cables)),
-        "load_cells": _stack_columns(table, names_of_cables("load_cell", cables), all_of_them=False),
-        "swivel": _stack_columns(table, names_of_cables("swivel", cables), all_of_them=False),
+        "counts": _stack_columns(table, tables.names_of_cables("count", cables)),
+        "unstrained_length": _stack_columns(table, tables.names_of_cables("length", cables)),
+        "load_cells": _stack_columns(table, tables.names_of_cables("load_cell", cables), all_of_them=False),
+        "swivel": _stack_columns(table, tables.names_of_cables("swivel", cables), all_of_them=False),
         "frequency": _frequencies(table),
         "position": _stack_columns(table, XYZ, all_of_them=False),
         "rotation": _rotation(table, ""),
@@ -301,7 +294,8 @@ def read_log(
     if columns is not None:
         chosen, said = _map_of_columns(file_path(columns, "columns"))
     converted = chosen is not None or path.suffix.lower() in ARRAYS
-    commented, rows = _sensors_of_comments(log_text(path, chosen) if converted else read_text(path, TABLE_LIMIT), path)
+    text = log_text(path, chosen) if converted else read_text(path, tables.TABLE_LIMIT)
+    commented, rows = _sensors_of_comments(text, path)
     given = sensors or said or commented
     given = given.replace(**deviations) if deviations else given
     table, cables = _read(path, rows)

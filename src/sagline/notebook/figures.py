@@ -20,24 +20,12 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
+from sagline.plot import sheet as sheets
 from sagline.plot.calibration import calibration
 from sagline.plot.drawing import draw_at_rest
 from sagline.plot.labels import PLACE, TENSIONS, TIME, name_lines
 from sagline.plot.plan import abscissa
 from sagline.plot.robot import drawn_pose
-from sagline.plot.sheet import (
-    BLUE,
-    COLORS,
-    axes_or_new,
-    cable_look,
-    draw_series,
-    format_axes,
-    format_clock,
-    shade_spans,
-    sheet,
-    svg_text,
-    unique_names,
-)
 from sagline.plot.style import PLAIN, Using
 from sagline.present.summaries import middle_plan
 from sagline.robot.robot import Robot
@@ -104,11 +92,11 @@ def _(run: Simulation) -> Figure | None:
 
 @figure_of.register
 def _(path: Path) -> Figure | None:
-    ax = axes_or_new(None, height=3.4)
+    ax = sheets.axes_or_new(None, height=3.4)
     x, y, _ = path.pose.position[_chosen(path.pose.position)].T
-    ax.plot(x, y, color=BLUE, linewidth=1.3)
-    ax.plot(x[:1], y[:1], "o", color=BLUE, markersize=5.0)
-    format_axes(ax, *PLACE[:2])
+    ax.plot(x, y, color=sheets.BLUE, linewidth=1.3)
+    ax.plot(x[:1], y[:1], "o", color=sheets.BLUE, markersize=5.0)
+    sheets.format_axes(ax, *PLACE[:2])
     ax.set_aspect("equal", adjustable="datalim")
     return _whole(ax)
 
@@ -124,12 +112,12 @@ def _(space: Workspace) -> Figure | None:
     level = np.moveaxis(space.level, third, 2)
     inside = np.flatnonzero((level >= 0.0).any(axis=(0, 1)))
     shown = np.unique(inside[np.linspace(0, inside.size - 1, LEVELS + 2).astype(np.intp)[1:-1]])
-    ax = axes_or_new(None, height=4.0)
+    ax = sheets.axes_or_new(None, height=4.0)
     for k, row in enumerate(shown):
-        color = COLORS[k % len(COLORS)]
+        color = sheets.COLORS[k % len(sheets.COLORS)]
         ax.contour(space.axes[first], space.axes[second], level[:, :, row].T, levels=[0.0], colors=[color])
         ax.plot([], [], color=color, label=f"${'xyz'[third]}$ = {space.axes[third][row]:.3g} m")
-    format_axes(ax, PLACE[first], PLACE[second])
+    sheets.format_axes(ax, PLACE[first], PLACE[second])
     ax.set_aspect("equal")
     name_lines(ax)
     return _whole(ax)
@@ -144,14 +132,16 @@ def _time_lines(
     clock: Array, axis: str, values: Array, label: str, gaps: Flags, names: tuple[str, ...] | None = None
 ) -> Figure:
     """Lines of the columns of `values` over `clock`, with at most about `MOST_SAMPLES` samples."""
-    figure = sheet(3.2)
+    figure = sheets.sheet(3.2)
     ax = figure.add_subplot()
     chosen = _chosen(values)
     for i, line in enumerate(values[chosen].T[:MOST_CABLES]):
-        look = {"color": COLORS[i], "label": names[i]} if names else {**cable_look(i), "label": f"cable {i}"}
-        draw_series(ax, clock[chosen], line, **look, linewidth=1.2)
-    shade_spans(ax, clock, true_runs(gaps)[:MOST_SAMPLES], "not feasible")
-    format_clock(ax, clock, label, axis)
+        look = sheets.cable_look(i) | {"label": f"cable {i}"}
+        if names:
+            look = {"color": sheets.COLORS[i], "label": names[i]}
+        sheets.draw_series(ax, clock[chosen], line, **look, linewidth=1.2)
+    sheets.shade_spans(ax, clock, true_runs(gaps)[:MOST_SAMPLES], "not feasible")
+    sheets.format_clock(ax, clock, label, axis)
     name_lines(ax)
     return figure
 
@@ -179,7 +169,7 @@ def _html(figure: Figure, description: str) -> str:
     if sum(len(line.get_xdata()) for line in lines if line.get_marker() not in ("None", None)) > MOST_MARKS:
         for line in lines:
             line.set_rasterized(True)
-    drawing = _themed(svg_text(figure, DOTS), description)
+    drawing = _themed(sheets.svg_text(figure, DOTS), description)
     if len(drawing.encode()) <= LARGEST:
         return drawing
     written = BytesIO()
@@ -201,6 +191,6 @@ def _themed(svg: str, description: str) -> str:
     """
     svg = _family.sub("", _remarks.sub("", svg)).strip()
     svg = _gray.sub(_ink, svg)
-    svg = unique_names(svg, f"s{sha1(svg.encode()).hexdigest()[:8]}-")
+    svg = sheets.unique_names(svg, f"s{sha1(svg.encode()).hexdigest()[:8]}-")
     look = f"max-width:100%;height:auto;color:inherit;fill:currentColor;stroke-linejoin:round;font-family:{FONT}"
     return svg.replace("<svg ", f'<svg role="img" aria-label="{escape(description)}" style="{look}" ', 1)

@@ -18,17 +18,8 @@ from sagline.core.indices import batch_length, part_of
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import tables
-from sagline.robot.batch import (
-    Index,
-    Robots,
-    cables_of,
-    first_of,
-    has_routing,
-    has_slanted_axes,
-    points_on_pulleys,
-    robot_fields,
-    robots_at,
-)
+from sagline.robot import batch
+from sagline.robot.batch import Index, Robots
 from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
 
@@ -126,15 +117,15 @@ class Equilibrium(Result, Tabular):
     def exit_point(self) -> Array:
         """Exit points in world axes [m], shape (m, 3) or (N, m, 3); frame anchors for cables without pulleys."""
         if self.contact is None:
-            (anchors,) = robot_fields(self.robot, "frame_anchors")
+            (anchors,) = batch.robot_fields(self.robot, "frame_anchors")
             return locked(np.array(np.broadcast_to(anchors, (*self.cables.shape, 3))))
         if self.contact.azimuth is not None:
-            (ends,) = robot_fields(self.robot, "platform_anchors")
+            (ends,) = batch.robot_fields(self.robot, "platform_anchors")
             ends = self.pose.position[..., None, :] + ends @ np.swapaxes(self.pose.matrix, -1, -2)
             span, azimuth = self.cables.span, self.contact.azimuth
             chord = np.stack((span * np.cos(azimuth), span * np.sin(azimuth), self.cables.rise), axis=-1)
             return locked(ends - chord)
-        return locked(points_on_pulleys(self.robot, self.pose, self.contact.wrap_angle))
+        return locked(batch.points_on_pulleys(self.robot, self.pose, self.contact.wrap_angle))
 
     @property
     def one_robot(self) -> Robot:
@@ -164,7 +155,7 @@ class Equilibrium(Result, Tabular):
         """
         part = part_of(index, self.pose.shape, "single equilibrium")
         contact = None if self.contact is None else self.contact.part(part)
-        robot, wrench = robots_at(self.robot, part), locked(self.wrench[part])
+        robot, wrench = batch.robots_at(self.robot, part), locked(self.wrench[part])
         return Equilibrium(robot, self.pose[part], wrench, self.cables[part], contact)
 
     def __iter__(self) -> Iterator[Equilibrium]:
@@ -228,16 +219,16 @@ def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> O
 
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:
     """Tension to which tension limits apply [N]: chord tension or frame-end tension, depending on the robot."""
-    if first_of(robot).tension_limits_of == "frame_end":
+    if batch.first_of(robot).tension_limits_of == "frame_end":
         return cables.frame_end_tension
     return cables.chord_tension if contact is None else contact.chord_tension
 
 
 def result_rows(robot: Robots) -> int:
     """Number of rows of kernel results for a robot or robots."""
-    if has_slanted_axes(robot):
+    if batch.has_slanted_axes(robot):
         return tables.SWIVEL_ROWS
-    return tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS
+    return tables.RESULT_ROWS if batch.has_routing(robot) else tables.BARE_ROWS
 
 
 def cables_of_results(
@@ -255,7 +246,7 @@ def cables_of_results(
 
     span, rise, length, tension = (row(k) for k in (tables.SPAN, tables.RISE, tables.LENGTH, tables.TENSION))
     contact = None
-    if has_routing(robot):
+    if batch.has_routing(robot):
         rows = (tables.WRAP, tables.WRAPPED, tables.DEAD, tables.TENSION, tables.SINE)
         contact = Contact(*(row(k) for k in rows))
         if len(results) > tables.RESULT_ROWS:
@@ -264,8 +255,8 @@ def cables_of_results(
         tension = locked(_free_chord_tension(span, rise, row(tables.HORIZONTAL), tension))
     cables = CableState(
         model=model,
-        cable=cables_of(robot),
-        gravity=first_of(robot).gravity,
+        cable=batch.cables_of(robot),
+        gravity=batch.first_of(robot).gravity,
         span=span,
         rise=rise,
         unstrained_length=length,

@@ -94,16 +94,11 @@ def kernel_length(state: Equilibrium) -> Array:
     if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
         return state.unstrained_length
     plain = replace(state, contact=replace(contact, winding=None))
-    wrapped, dead, _ = _routing(plain, guided=True)
+    wrapped, dead, _ = actual_routing(plain, guided=True)
     return locked(state.free_length + (wrapped + dead))
 
 
-def actual_routing(state: Equilibrium) -> _Routing:
-    """Lengths and tensions of the routing with guides, and with friction if `state` has winding directions."""
-    return _routing(state, guided=False)
-
-
-def _routing(state: Equilibrium, *, guided: bool) -> _Routing:
+def actual_routing(state: Equilibrium, *, guided: bool = False) -> _Routing:
     """Lengths and tensions of the routing; guided: True for straight guided cables in place of catenaries."""
     if isinstance(state.robot, Robot):
         return _routing_of_robot(state, state.robot, guided=guided)
