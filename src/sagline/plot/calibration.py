@@ -123,8 +123,7 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
         for k, (name, column) in enumerate(zip(names, values[shown].T, strict=True)):
             within, color = np.where(np.abs(column) <= REACH, column, np.nan), COLORS[k % len(COLORS)]
             look = {"color": color, "linewidth": 0.0, "zorder": 2.0}
-            mark = MARKS[k // len(COLORS) % len(MARKS)]
-            ax.plot(found.rows[shown], within, mark, markersize=2.6, label=name, **look)
+            ax.plot(found.rows[shown], within, MARKS[k // len(COLORS) % len(MARKS)], markersize=2.6, label=name, **look)
             for side, arrow in ((1.0, "^"), (-1.0, "v")):
                 beyond = side * column > REACH
                 ax.plot(found.rows[shown][beyond], np.full(beyond.sum(), side * REACH), arrow, markersize=4.0, **look)

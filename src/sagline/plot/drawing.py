@@ -202,8 +202,7 @@ def _label_boxes(places: Sequence[Array], size: float) -> list[Array]:
 
 def _free_axes(occupied: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
     """Draw the directions of the world axes in the emptiest corner of the picture."""
-    width = float(np.ptp(limits[0]))
-    length = round_below(ARROW * width)
+    length = round_below(ARROW * float(np.ptp(limits[0])))
     ends = length * view[:2].T
     low, high = np.minimum(ends.min(axis=0), 0.0) - 1.4 * size, np.maximum(ends.max(axis=0), 0.0) + 1.4 * size
     corners = [np.array([x, y]) for y in (limits[1, 0] - low[1], limits[1, 1] - high[1])

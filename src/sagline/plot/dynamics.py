@@ -91,8 +91,7 @@ def _swinging(states: tuple[Vibration, ...], clock: Array) -> LineCollection:
     for (first, one), (second, other) in pairwise(zip(clock, states, strict=True)):
         count = min(one.frequency.size, other.frequency.size)
         ends = np.stack((one.frequency[:count], other.frequency[:count]), axis=1)
-        places = np.broadcast_to((first, second), ends.shape)
-        pieces.append(np.stack((places, ends), axis=2))
+        pieces.append(np.stack((np.broadcast_to((first, second), ends.shape), ends), axis=2))
         shares.append(0.5 * (one.platform_share[:count] + other.platform_share[:count]))
     share = np.concatenate(shares)
     return LineCollection(

@@ -61,8 +61,7 @@ def visible_parts(
     """Visible parts of lines."""
     if not lines:
         return []
-    everything = np.concatenate([line.points for line in lines])
-    size = float(np.ptp(everything, axis=0).max()) or 1.0
+    size = float(np.ptp(np.concatenate([line.points for line in lines]), axis=0).max()) or 1.0
     over = [np.column_stack((label, np.full(len(label), FAR * size))) for label in labels]
     starts = np.concatenate([line.points[:-1] for line in lines])
     ends = np.concatenate([line.points[1:] for line in lines])

@@ -43,8 +43,7 @@ def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
     if pose is not None:
         return single_pose(pose)
     if robot.test_box is None:
-        allowed = "a single pose, because the robot has no test box"
-        raise InvalidValueError("pose", "missing", allowed, "Give one pose.")
+        raise InvalidValueError("pose", "missing", "a single pose, because the robot has no test box", "Give one pose.")
     return Pose(0.5 * (robot.test_box.low + robot.test_box.high))
 
 

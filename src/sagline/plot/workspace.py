@@ -240,8 +240,7 @@ def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
     if levels.size:
         margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
         drawn = ax.contour(cut.across, cut.up, margin, levels=levels, colors="0.25", linewidths=0.7, zorder=2.0)
-        size = current().tick
-        numbers = ax.clabel(drawn, fmt=lambda value: n(value, unit="N"), fontsize=size, inline_spacing=3)
+        numbers = ax.clabel(drawn, fmt=lambda value: n(value, unit="N"), fontsize=current().tick, inline_spacing=3)
         for number in numbers:
             number.set_path_effects([*HALO])
     ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors="black", linewidths=2.2, zorder=2.5)
@@ -348,8 +347,7 @@ def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
     cells = np.floor((vertices - low) / width).astype(np.int64)
     _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     joined = which.reshape(-1)[faces]
-    kept = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
-    return first, joined[kept]
+    return first, joined[(joined != np.roll(joined, 1, axis=1)).all(axis=1)]
 
 
 def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, Color]) -> None:

@@ -81,8 +81,7 @@ def _initial_state(
 ) -> tuple[Equilibrium, _EncoderScale, _EncoderScale]:
     """True equilibrium at the start, and the conversions between lengths and counts: in the PLCs, by the true drums."""
     pose = _start_pose(nominal, start)
-    plan = inverse(nominal, pose)
-    planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
+    planned = _feasible_lengths(inverse(nominal, pose).unstrained_length, nominal, "start")
     counts = np.zeros(nominal.cable_count)
     scale = _EncoderScale(nominal, planned, counts)
     if (winch := nominal.winches) is not None and winch.length_zero is not None:

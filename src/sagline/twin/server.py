@@ -197,8 +197,7 @@ def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connectio
     """Run the machine until the process is killed. SIGINT is ignored, because the controller must stop the robot."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        machine = Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN)
-        server = Server(machine)
+        server = Server(Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN))
     except SaglineError as error:
         pipe.send(error)
         return

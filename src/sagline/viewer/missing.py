@@ -61,8 +61,7 @@ def missing_of(snapshot: Snapshot) -> MissingWrench | None:
     try:
         for _ in range(ATTEMPTS):
             missing += MORE * _step(held)
-            wrench = locked(state.wrench + missing)
-            held = inverse(robot, snapshot.pose, state.cables.model, MinimumNorm(), wrench)
+            held = inverse(robot, snapshot.pose, state.cables.model, MinimumNorm(), locked(state.wrench + missing))
             if held.feasible:
                 return MissingWrench(locked(missing), held.state, _limits(plan, held))
     except SaglineError:

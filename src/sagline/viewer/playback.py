@@ -93,8 +93,7 @@ def _infeasible_spans(plan: Plan, time: Array) -> tuple[Span, ...]:
     def why(rows: slice) -> str:
         lost = plan.status[rows] == PoseStatus.INFEASIBLE
         if not lost.any():  # poses before and after infeasible ones are often unstable
-            status = PoseStatus(int(plan.status[rows][~plan.solved[rows]][0]))
-            return status.name.replace("_", " ").lower()
+            return PoseStatus(int(plan.status[rows][~plan.solved[rows]][0])).name.replace("_", " ").lower()
         short = plan.shortfall[rows][lost]
         known = short[np.isfinite(short)]
         parts = ["not feasible"]

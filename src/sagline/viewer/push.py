@@ -141,8 +141,7 @@ def _redistributed(state: Equilibrium, push: Push) -> Reserve:
     poses = Pose.from_quaternion(np.tile(state.pose.position, (FORCES, 1)), np.tile(state.pose.quaternion, (FORCES, 1)))
 
     def is_exceeded(forces: Array) -> Flags:
-        plan = inverse(robot, poses, state.cables.model, wrench=unit.wrench(state, forces))
-        return np.asarray(~plan.feasible)
+        return np.asarray(~inverse(robot, poses, state.cables.model, wrench=unit.wrench(state, forces)).feasible)
 
     return Reserve(_bracket(is_exceeded, _upper_bound(state))[0])
 

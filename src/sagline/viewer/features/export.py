@@ -192,8 +192,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
         for piece in np.split(course, gaps):
             known = piece[np.isfinite(piece[:, 0])]
             if len(known) > 1:
-                tube = shapes.tube(known, _CABLE_RADIUS * shapes.size_of(robot))
-                _add(scene, f"cable {i}", tube, tuple(colors[i]))
+                _add(scene, f"cable {i}", shapes.tube(known, _CABLE_RADIUS * shapes.size_of(robot)), tuple(colors[i]))
     scene.apply_transform(_Z_UP_TO_Y_UP)
     return bytes(scene.export(file_type="glb"))
 

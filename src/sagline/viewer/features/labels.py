@@ -108,8 +108,7 @@ class LabelsFeature(Feature):
             before = self._hidden.get(number, frozenset()) & names  # a new label is visible at first
             self._hidden[number] = hidden
             for name in before ^ hidden:  # to this client alone, which viser has no public method for
-                message = SetSceneNodeVisibilityMessage(name, visible=name in before)
-                client._websock_connection.queue_message(message)
+                client._websock_connection.queue_message(SetSceneNodeVisibilityMessage(name, visible=name in before))
 
     def _forget(self, client: int) -> None:
         self._hidden.pop(client, None)

@@ -251,8 +251,7 @@ class RegionFeature(Feature):
             *_, hull = self._result
             if hull is not None:
                 patches = workspace.near_patches(hull, self._place, workspace.REACH * self._size)
-            few = is_underconstrained(self._levels.robot)
-            what = "tension to its nearest limit" if few else "force with moment"
+            what = "tension to its nearest limit" if is_underconstrained(self._levels.robot) else "force with moment"
             self._margin_html.content = html_block(f"<b>Margin here</b>, {what}: {text}")
         with self._server.atomic():
             workspace.draw_patches(self._nodes, "/wall", patches)
