@@ -43,7 +43,6 @@ class _Estimator:
     """Forward kinematics of each sample. Each search starts at the previous pose."""
 
     def __init__(self, robot: Robot, model: CableModel) -> None:
-        """Begin without a pose."""
         self._solver = ForwardSolver(robot, model)
         self.forget()
 
@@ -60,7 +59,6 @@ class _Estimator:
         self.position, self.quaternion, self.status = np.full(3, np.nan), np.full(4, np.nan), -1
 
     def begin_at(self, pose: Pose) -> None:
-        """Set the pose to a known pose."""
         self._solver.reset(pose)
         self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
 
@@ -77,11 +75,9 @@ class _Garbage:
     """Switch for garbage collection, which is off during motion because it can take longer than a cycle."""
 
     def __init__(self) -> None:
-        """Create the switch; nothing changes yet."""
         self._stopped = False
 
     def stop(self) -> None:
-        """Switch collection off."""
         if not self._stopped and gc.isenabled():
             self._stopped = True
             gc.disable()
@@ -97,7 +93,6 @@ class _Run:
     """The present motion with its record; if the robot is at rest, the last motion."""
 
     def __init__(self) -> None:
-        """Begin without a motion."""
         self.motion: Motion | None = None  # planned motion; None for a jog of the platform, and before the first motion
         self.paused: Along | None = None
         # status: final status; RUNNING before the end of the motion

@@ -89,7 +89,6 @@ class _Fade:
 
     @property
     def done(self) -> bool:
-        """True if the difference is zero."""
         return self._cycle >= self._cycles
 
     def step(self) -> tuple[Array, Array] | None:

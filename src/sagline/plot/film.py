@@ -104,7 +104,6 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
 
 
 def _energy_shares(mode: ListedMode) -> str:
-    """Text with the shares of platform and cables in the kinetic energy of a mode."""
     words = f"kinetic energy: platform {100.0 * mode.platform_share:.0f} %"
     if mode.cable is None or mode.cable_share < LEAST_SHARE:
         return f"{words}, each cable less than {100.0 * LEAST_SHARE:g} %"

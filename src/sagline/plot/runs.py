@@ -270,7 +270,6 @@ def _clock(done: Execution) -> Array:
 
 
 def _finished(ax: Axes, clock: Array, label: str) -> Axes:
-    """Finish the axes: labels, limits, and the names of the lines."""
     sheet.format_clock(ax, clock, label)
     name_lines(ax)
     return ax
