@@ -144,9 +144,8 @@ def _unknown(text: str, what: str) -> InvalidValueError:
         return InvalidValueError("fault", brief(text), f"one of {', '.join(items)}", step)
     of_it = [kind for kind in KINDS.values() if kind.item == item]
     happens = ", ".join(kind.words.replace("#", f"# {kind.unit}") for kind in of_it if kind.words)
-    several = f"{item} {'NUMBER ' if of_it[0].numbered else ''}"
-    allowed = f"{several}and then {happens}, # a number" if happens else item
-    return InvalidValueError("fault", brief(text), allowed.replace(", # a number", ""), 'When: "at 40 s for 2 s".')
+    allowed = f"{item} {'NUMBER ' if of_it[0].numbered else ''}and then {happens}" if happens else item
+    return InvalidValueError("fault", brief(text), allowed, 'When: "at 40 s for 2 s".')
 
 
 def _refused(text: str, allowed: str) -> InvalidValueError:

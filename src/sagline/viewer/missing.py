@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -56,16 +57,13 @@ def missing_of(snapshot: Snapshot) -> MissingWrench | None:
     if plan is None or snapshot.status not in _EXPLAINED or is_underconstrained(snapshot.robot):
         return None
     robot, state = snapshot.robot, plan.state
-    missing = np.zeros(6)
-    held = plan
-    try:
+    missing, held = np.zeros(6), plan
+    with suppress(SaglineError):
         for _ in range(ATTEMPTS):
             missing += MORE * _step(held)
             held = inverse(robot, snapshot.pose, state.cables.model, MinimumNorm(), locked(state.wrench + missing))
             if held.feasible:
                 return MissingWrench(locked(missing), held.state, _limits(plan, held))
-    except SaglineError:
-        return None
     return None
 
 

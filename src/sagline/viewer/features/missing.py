@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from contextlib import suppress
 from html import escape
 from typing import Any, Final
 
@@ -78,10 +79,8 @@ def _other_rows(snapshot: Snapshot) -> list[tuple[str, str]]:
         here = escape(method_name(snapshot.plan.tension))
         return [("Method", f"{here} has no solution here. <button {chosen_by(SHARING, other)}>{other}</button>")]
     if status is PoseStatus.SINGULAR:
-        try:
+        with suppress(SaglineError):
             return [("Unconstrained motion", escape(unresisted_motion(snapshot.robot, snapshot.pose).text))]
-        except SaglineError:
-            return []
     return []
 
 
