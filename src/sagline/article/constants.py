@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from sagline.article.drawing import Drawings, axes, chapter, finding, shades
 from sagline.article.regressions import (
@@ -31,9 +32,6 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, PURPLE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, table_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MIDDLE, DENSE = 2, -1  # indices of the angle 0.754 rad and of the largest density among the samples
 LOWEST = np.geomspace(40.0, 800.0, 12)  # values of the lowest sampled tension [N]
@@ -72,10 +70,9 @@ def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings)
         ax.plot(sampling.chords, platform.intercept[MIDDLE, :, k], color=color, marker="o", markersize=3.0, label=label)
         ax.plot(sampling.chords, frame.intercept[MIDDLE, :, k], color=color, marker="s", markersize=3.0, linestyle="--")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    bent = [_bend(sampling.chords[:, None], study.intercept, study.h_b[:, None, :]) for study in (platform, frame)]
     return finding(
         "b-over-chord",
-        numbers={"nonproportional_share_platform": bent[0], "nonproportional_share_frame": bent[1]},
+        numbers={"nonproportional_share_platform": platform.bend, "nonproportional_share_frame": frame.bend},
         panels=(
             draw.panel(
                 figure,
@@ -90,13 +87,9 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
     sampling = platform.sampling
     figure, ax = axes(r"$\rho$ [kg/m]", r"$h_b$ [N/m]")
     for k, color in enumerate(shades(sampling.angles.size)):
-        label = f"{sampling.angles[k]:g}"
-        ax.plot(
-            sampling.densities, platform.h_b[k], color=color, marker="o", markersize=2.6, linewidth=0.9, label=label
-        )
-        ax.plot(
-            sampling.densities, frame.h_b[k], color=color, marker="s", markersize=2.6, linewidth=0.9, linestyle="--"
-        )
+        look: dict[str, Any] = {"color": color, "markersize": 2.6, "linewidth": 0.9}
+        ax.plot(sampling.densities, platform.h_b[k], "o-", **look, label=f"{sampling.angles[k]:g}")
+        ax.plot(sampling.densities, frame.h_b[k], "s--", **look)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     caption = "h_b at five angles: platform end (circles), frame end (squares, dashed)."
     spread = np.ptp(frame.k_h_of_angle) / abs(frame.k_h)
@@ -119,14 +112,12 @@ def _range(
 ) -> Finding:
     figure, ax = axes("lowest sampled $T_x$ [N]", "$k_p$ [m²/s⁴]")
     _course(ax, over_lowest, "lowest", "k_p", BLUE, "regression")
-    ax.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
-    ax.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
+    _references(ax, PUBLISHED_K_P, SHALLOW_K_P, "$g^2/24$")
     _logarithmic(ax, (50, 100, 200, 500))
     second, bx = axes("highest sampled $T_x$ [N]", "$|k_h|$ [m/s²]")
     _course(bx, over_highest, "highest", "k_h_frame", BLUE, "frame end")
     _course(bx, over_highest, "highest", "k_h_platform", PURPLE, "platform end")
-    bx.axhline(PUBLISHED_K_H, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
-    bx.axhline(SHALLOW_K_H, color="0.4", linewidth=0.9, linestyle=":", label="$g/2$")
+    _references(bx, PUBLISHED_K_H, SHALLOW_K_H, "$g/2$")
     _logarithmic(bx, (500, 2000, 10_000, 40_000))
     all_k_p = [c.k_p for c in over_lowest]
     return finding(
@@ -175,20 +166,20 @@ def _limit(scaled: Sequence[Constants], draw: Drawings) -> Finding:
 
 
 def _course(ax: Axes, course: Sequence[Constants], x: str, y: str, color: str, label: str) -> None:
-    values = [abs(getattr(c, y)) for c in course]
-    ax.plot(
-        [getattr(c, x) for c in course], values, color=color, marker="o", markersize=3.0, linewidth=1.1, label=label
-    )
+    places, values = ([abs(getattr(c, name)) for c in course] for name in (x, y))
+    ax.plot(places, values, "o-", color=color, markersize=3.0, linewidth=1.1, label=label)
+
+
+def _references(ax: Axes, published: float, shallow: float, label: str) -> None:
+    """Draw the published value of a constant, and its value for taut cables with the text `label`."""
+    ax.axhline(published, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
+    ax.axhline(shallow, color="0.4", linewidth=0.9, linestyle=":", label=label)
 
 
 def _logarithmic(ax: Axes, ticks: tuple[int, ...]) -> None:
     ax.set_xscale("log")
     ax.minorticks_off()
     ax.set_xticks(ticks, labels=[str(tick) for tick in ticks])
-
-
-def _bend(chords: Array, intercept: Array, h_b: Array) -> float:
-    return float(np.abs(intercept - h_b * chords).max() / np.abs(intercept).max())
 
 
 CHORD = 10.0  # [m]
@@ -314,8 +305,7 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     each = study.p_q / densities**2
     second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
     bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
-    bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
-    bx.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
+    _references(bx, PUBLISHED_K_P, SHALLOW_K_P, "$g^2/24$")
     return finding(
         "p-over-density",
         numbers={

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
 from itertools import count
 from math import ceil
 from string import Formatter
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import matplotlib
 import numpy as np
 from matplotlib import patheffects
+from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.contour import ContourSet
+from matplotlib.path import Path
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.labels import legend_columns
 from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, Sheet, cable_look, format_axes, svg_text, unique_names
 from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.contour import ContourSet
-    from matplotlib.path import Path
 
 
 class _Numbers(Formatter):

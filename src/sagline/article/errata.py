@@ -232,7 +232,8 @@ def _vertical_and_level() -> Sequence[Number]:
 def _error_formula() -> Sequence[Number]:
     """Erratum 9: equation (56) is a sum of vectors B_i - P, but the errors in Table 2 are distances."""
     table, robot = table2(), sl.load_robot("article-prototype")
-    sums = np.array([(robot.platform_anchors + actual - desired).sum(axis=0) for desired, actual in _pairs()])
+    pairs = zip(table.desired, table.actual, strict=True)
+    sums = np.array([(robot.platform_anchors + actual - desired).sum(axis=0) for desired, actual in pairs])
     literal = np.linalg.norm(sums, axis=1)
     return (
         (
@@ -282,11 +283,6 @@ def _printed_formulas() -> Sequence[Number]:
             "mm",
         ),
     )
-
-
-def _pairs() -> list[tuple[Array, Array]]:
-    table = table2()
-    return list(zip(table.desired, table.actual, strict=True))
 
 
 _NUMBERS = (

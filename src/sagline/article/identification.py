@@ -7,7 +7,7 @@ import numpy as np
 import sagline as sl
 from sagline.article.drawing import Drawings, axes, chapter, draw_errors, finding, map_axes, shades
 from sagline.article.identify import EmpiricalFit, identify_empirical
-from sagline.article.identify_cable import CableFit, identify_cable
+from sagline.article.identify_cable import UNITS, CableFit, identify_cable
 from sagline.article.regressions import simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -21,7 +21,6 @@ EDGES, TICKS = np.outer(10.0 ** np.arange(-4.0, -1.0), (1.0, 2.0, 5.0)).ravel(),
 LINES = (1e-3, 5e-3, 1e-2)  # contour lines of the map [m]
 SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # standard deviations of lengths [m] and tensions [N]
 BOTH = ("linear_density", "axial_stiffness")
-UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
 CASES = (  # for each set of synthetic measurements: lowest and highest chord tension [N], and the unknowns
     ("loose and taut", 30.0, 600.0, BOTH),
     ("taut only", 300.0, 600.0, BOTH),

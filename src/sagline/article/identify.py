@@ -25,12 +25,10 @@ POINT_BYTES = 400.0  # memory per combination of span, rise and tension during t
 
 
 class Estimate(NamedTuple):
-    """A fitted constant and its confidence interval.
+    """A fitted constant and its confidence interval."""
 
-    The residuals of the least-squares fit are errors of the model in the working range, not noise. The confidence
-    interval therefore shows how much the constant varies within the working range.
-    """
-
+    # The residuals of the least-squares fit are errors of the model in the working range, not noise. The confidence
+    # interval therefore shows how much the constant varies within the working range.
     value: float  # value of the constant
     low: float  # lower end of the 95 % interval
     high: float  # upper end of the 95 % interval

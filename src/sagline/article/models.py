@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
@@ -17,9 +16,6 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import COLORS, LINE_STYLES, TICK
 from sagline.present.page import Chapter, Finding, Panel, Table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MODELS: tuple[sl.CableModel, ...] = (
     sl.Straight(),

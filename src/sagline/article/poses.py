@@ -17,7 +17,6 @@ from sagline.article.explanations import (
     PULLEY,
     ZERO,
     Explanation,
-    Parameter,
     corrected_aic,
 )
 from sagline.article.regressions import fit_line
@@ -139,7 +138,8 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     slopes = {name: study.height_slope(error) for name, error in study.trends.items()}
     listed = []
     for k, parameter in enumerate(PARAMETERS):
-        ax, label, error = pairs[k // 5][1], _typical(parameter), study.trends[parameter.name]
+        ax, error = pairs[k // 5][1], study.trends[parameter.name]
+        label = f"{parameter.name} {n(parameter.typical, '+g', parameter.unit)}"
         line = fit_line(height, 1e3 * error[:, 2])
         course = line.slope * fine + line.intercept
         look = {"color": COLORS[k % 5], "linestyle": LINE_STYLES[k % 5]}
@@ -168,11 +168,6 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
         stiffer=slopes[MODULUS],
         falling=", ".join(falling),
     )
-
-
-def _typical(parameter: Parameter) -> str:
-    """Text with the name of a parameter and its typical error."""
-    return f"{parameter.name} {n(parameter.typical, '+g', parameter.unit)}"
 
 
 def _span(values: Array, form: str) -> str:
@@ -279,15 +274,8 @@ def _panel(study: TenPoses, found: Explanation, count: str, draw: Drawings) -> P
     height = study.table.desired[:, 2]
     for axis, name, color, marker in ((2, "z", VERMILLION, "o"), (1, "y", BLUE, "s")):
         ax.plot(height, 1e3 * study.table.error[:, axis], marker, color=color, markersize=4.5, label=f"{name} measured")
-        ax.plot(
-            height,
-            1e3 * found.predicted[:, axis],
-            marker,
-            color=color,
-            markersize=7.0,
-            markerfacecolor="none",
-            label=f"{name} explained",
-        )
+        look: dict[str, Any] = {"color": color, "markersize": 7.0, "markerfacecolor": "none"}
+        ax.plot(height, 1e3 * found.predicted[:, axis], marker, **look, label=f"{name} explained")
     return draw.panel(figure, f"Best explanation by {count}: {_values(found)}.")
 
 

@@ -118,6 +118,12 @@ class InterceptStudy:
     k_h_of_angle: Array  # factor in h_b = k_h rho, fitted for each angle [m/s^2], shape (a,)
     k_h: float  # factor in h_b = k_h rho, fitted for all angles together [m/s^2]
 
+    @property
+    def bend(self) -> float:
+        """Largest deviation of b_pi from h_b D, divided by the largest b_pi."""
+        rest = self.intercept - self.h_b[:, None, :] * self.sampling.chords[:, None]
+        return float(np.abs(rest).max() / np.abs(self.intercept).max())
+
 
 def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
     """Regressions (21), (27), (28) of the article, first for the platform end, then for the frame end."""

@@ -1,7 +1,4 @@
-"""Findings of a calibration as data, and standard deviations of the sensors from the residuals.
-
-The deviations are variance components by REML; see docs/model.md, section 14.
-"""
+"""Findings of a calibration as data, and standard deviations of the sensors (REML; docs/model.md, section 14)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Swivel angles of pulleys and natural frequencies, which the kernel does not know: predictions and whitening.
 
-A reading depends on the pose of the platform and on the parameters. The derivatives of the pose follow from the force
-balance by the implicit function theorem. The readings are added to the whitened readings of the kernel like the
-measurements of a later time in a Kalman filter; see docs/model.md, section 14.
+They are added to the whitened readings of the kernel like the measurements of a later time in a Kalman filter; see
+docs/model.md, section 14.
 """
 
 from __future__ import annotations

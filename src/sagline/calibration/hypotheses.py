@@ -69,20 +69,13 @@ class Hypothesis(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """Tests of hypotheses about mistakes in a log.
+    """Tests of hypotheses about mistakes in a log."""
 
-    Attributes:
-        robot: The robot before the calibration.
-        model: Cable model.
-        log: The whole log.
-        rows: Indices of the rows that the tests may use.
-        found: Poses by forward kinematics for each tested change of the lengths and each number of rows.
-    """
-
-    robot: Robot
+    robot: Robot  # the robot before the calibration
     model: CableModel
-    log: WinchLog
-    rows: Indices
+    log: WinchLog  # the whole log
+    rows: Indices  # indices of the rows that the tests may use
+    # poses by forward kinematics for each tested change of the lengths and each number of rows
     found: dict[tuple[Hypothesis, int], Pose] = field(default_factory=dict)
 
     def result(self, change: Hypothesis) -> tuple[float, float, Array]:

@@ -1,7 +1,7 @@
 """Unobservable directions: combinations of parameters that change no reading, each with its name.
 
-Some unobservable directions are symmetries. For example, a shift of the origin of the world frame changes parameters,
-but no reading, because the origin is a convention. See docs/model.md, section 14.
+Some are symmetries: a shift of the origin of the world frame changes parameters, but no reading, because the origin is
+a convention. See docs/model.md, section 14.
 """
 
 from __future__ import annotations

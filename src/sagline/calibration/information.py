@@ -21,20 +21,14 @@ _WORTH: Final = 1e-9  # smallest increase of the log det by an exchange; smaller
 
 
 class Information:
-    """Information about P parameters that the readings of chosen candidates contain.
-
-    Attributes:
-        rows: Derivatives of the whitened readings by the internal parameters, shape (N, k, P).
-        covariance: Covariance of the parameters that follows from the prior and the chosen candidates, shape (P, P).
-        chosen: Indices of the chosen candidates, in the order of choice.
-    """
+    """Information about P parameters that the readings of chosen candidates contain."""
 
     def __init__(self, rows: Array, known: Array) -> None:
         """Begin without a chosen candidate; known: inverse (P, P) of the prior covariance."""
-        self.rows = rows
-        self.chosen: list[int] = []
-        self._known = known
-        self._unit = np.eye(rows.shape[1])
+        self.rows = rows  # derivatives of the whitened readings by the internal parameters, (N, k, P)
+        self.chosen: list[int] = []  # indices of the chosen candidates, in the order of choice
+        self._known, self._unit = known, np.eye(rows.shape[1])
+        # covariance (P, P) that follows from the prior and the chosen candidates
         self.covariance, self._heard = self._recompute()
 
     def gains(self) -> Array:

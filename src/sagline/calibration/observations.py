@@ -69,11 +69,10 @@ class Readings(NamedTuple):
 
 
 class WhitenedRows(NamedTuple):
-    """Whitened observations at N equilibria: the rows are independent, each with a standard deviation of 1.
+    """Whitened observations at N equilibria: the rows are independent, each with a standard deviation of 1."""
 
-    The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured; with further
-    readings, more.
-    """
+    # The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured; with further
+    # readings, more.
 
     # Derivatives by the internal parameters, (N, R, P), after elimination of the true lengths. Rows without a reading
     # are zero. Where `logarithmic` is True, the internal parameter is the logarithm.

@@ -88,14 +88,10 @@ STRETCH: Final = 1.1  # memory for nodes, relative to the longest required lengt
 
 
 class ChainPlant(Plant):
-    """State of a robot with lumped-mass cables during a simulation.
+    """State of a robot with lumped-mass cables during a simulation."""
 
-    The kernel moves the whole body: the platform with half an element of each cable. The records are converted to the
-    motion of the platform.
-
-    Attributes:
-        nodes: Elements per cable at the start.
-    """
+    # The kernel moves the whole body: the platform with half an element of each cable. The records are converted to the
+    # motion of the platform. `nodes` is the number of elements per cable at the start.
 
     kernel: ClassVar[Any] = staticmethod(run.run_chains)
     cable_mass: ClassVar[str] = "lumped"

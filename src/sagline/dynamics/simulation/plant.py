@@ -51,10 +51,9 @@ class Records:
 
 
 class Plant:
-    """Mutable state of a robot during a simulation.
+    """Mutable state of a robot during a simulation."""
 
-    In this class the platform axes are the principal axes of the platform, with the origin at the center of mass.
-    """
+    # In this class the platform axes are the principal axes of the platform, with the origin at the center of mass.
 
     # integrator; its arguments are `arguments`, arrays of records, number of steps, and steps per record
     kernel: ClassVar[Any] = staticmethod(motion.run_massless)

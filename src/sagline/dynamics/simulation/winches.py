@@ -109,17 +109,13 @@ COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # r
 
 
 class Encoders:
-    """Encoders on drums.
-
-    Attributes:
-        counts: Whole counts, as floats, (m,).
-    """
+    """Encoders on drums."""
 
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
         """Create the encoders of a robot with complete drum data; `wound` (m,) [m]; `stretch` (m,)."""
         drums, m = drums_of(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
-        self.counts = np.empty(m)
+        self.counts = np.empty(m)  # whole counts, as floats
         offset = drums.winches.count_zero + zero * rate
         given = ((drums.table, drums.starts), wound, locked(stretch), locked(offset), locked(rate * 1.0))
         self._read = bound(read_encoders, *given, np.empty((3, 1, m)), self.counts)
@@ -137,12 +133,7 @@ class Encoders:
 
 
 class LoadCells:
-    """Load cells at the frame ends of the cables.
-
-    Attributes:
-        reading: Measured tensions [N], (m,).
-        generator: Random generator of the noise.
-    """
+    """Load cells at the frame ends of the cables."""
 
     def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
         """Create the load cells of `robot`. If the robot has no winches, the load cells measure the true tensions."""
@@ -153,8 +144,8 @@ class LoadCells:
             cells[:3] = winch.load_cell_gain, winch.load_cell_bias, winch.load_cell_deviation
             if winch.load_cell_range is not None:
                 cells[3] = winch.load_cell_range
-        self.generator, self.reading = np.random.default_rng(seed), np.empty(m)
-        self._noise = np.empty(m)
+        self.generator = np.random.default_rng(seed)  # of the noise
+        self.reading, self._noise = np.empty(m), np.empty(m)  # measured tensions [N]
         self._read = bound(read_cells, tension, locked(cells), self._noise, self.reading)
 
     def read(self) -> None:

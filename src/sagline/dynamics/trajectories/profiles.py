@@ -35,11 +35,10 @@ class HalfPlanes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceBalance:
-    """Force balance of the platform at K positions of a curve, with sag forces at nearby tensions.
+    """Force balance of the platform at K positions of a curve, with sag forces at nearby tensions."""
 
-    J tau = needed - u w_u - x w_x, with u the acceleration and x the squared speed of the curve parameter. The sag
-    forces are exact at the last computed tensions, and nearly constant close to these tensions.
-    """
+    # J tau = needed - u w_u - x w_x, with u the acceleration and x the squared speed of the curve parameter. The sag
+    # forces are exact at the last computed tensions, and nearly constant close to these tensions.
 
     robot: Robot  # the robot, with the tension limits
     jet: Jet  # the positions
