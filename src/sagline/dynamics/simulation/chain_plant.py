@@ -140,11 +140,11 @@ class ChainPlant(Plant):
         self._travel = nodes * table[:, c.ELEMENT] * np.sqrt(table[:, c.DENSITY] / table[:, c.STIFFNESS])
         self._ends = (robot.platform_anchors - robot.center_of_mass) @ self.axes
         self._carried = 0.5 * table[:, c.DENSITY] * table[:, c.ELEMENT]
-        self._carrier = _LoadedPlatform.of(self.inertia, self._carried, self._ends)
-        turning = Rotation.from_quat(self.state[body.TURN : body.VELOCITY]).as_matrix()
-        velocity, spin = self.state[body.VELOCITY : body.MOMENTUM], given.twist[3:]
-        self.state = self._carrier.state(self.state[: body.TURN], turning, velocity, spin)
-        self._set_node_speeds(velocity + np.cross(spin, self._ends @ turning.T), given.rate)
+        own = np.concatenate((self.state[: body.MOMENTUM], given.twist[3:]))
+        self._change_body(own)
+        turning = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix()
+        ends = np.cross(given.twist[3:], self._ends @ turning.T)
+        self._set_node_speeds(own[body.VELOCITY : body.MOMENTUM] + ends, given.rate)
 
     def _set_node_speeds(self, at_platform: Array, rate: Array) -> None:
         """Interpolate node speeds between both cable ends. The speed at the frame includes that of paid-out cable."""

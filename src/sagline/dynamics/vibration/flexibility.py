@@ -72,7 +72,7 @@ def flexibility(state: Equilibrium, force: Array) -> Flexibility:
     slack = (hung.size_b == 0.0) & (weight == 0.0)
     with np.errstate(all="ignore"):
         by_force, by_weight, outer = _by_force(hung), _by_weight(hung), _outer(hung)
-        by_length = _turning(level, below, hung.size_a) + (np.eye(3) / stiffness[..., None, None])
+        by_length = flexibility_per_length(np.stack((level, np.zeros_like(level), below), axis=-1), stiffness)
 
     def world(matrix: Array) -> Array:
         held = np.where(slack[..., None, None], 0.0, matrix)
@@ -101,11 +101,11 @@ def _axes(force: Array) -> Array:
     return axes
 
 
-def _turning(h: Array, v: Array, size: Array) -> Array:
-    """Matrix (1 - t t^T)/N for the force (h, 0, v), shape (..., 3, 3)."""
-    force = np.stack((h, np.zeros_like(h), v), axis=-1)
-    unit = force / size[..., None]
-    return np.asarray((np.eye(3) - unit[..., :, None] * unit[..., None, :]) / size[..., None, None])
+def flexibility_per_length(force: Array, stiffness: Array | float) -> Array:
+    """Flexibility per length C at points of cables with given forces (..., 3) and EA (...), shape (..., 3, 3)."""
+    size = np.linalg.norm(force, axis=-1)[..., None, None]
+    tangent = force[..., :, None] * force[..., None, :] / size**2
+    return np.asarray(np.eye(3) / np.asarray(stiffness)[..., None, None] + (np.eye(3) - tangent) / size)
 
 
 def _by_force(hung: _CatenaryState) -> Array:

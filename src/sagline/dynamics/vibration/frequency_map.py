@@ -17,7 +17,7 @@ from sagline.core.table import Columns, Tabular
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_model
 from sagline.dynamics.vibration.response import Receptance
 from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
-from sagline.dynamics.vibration.vibration import UP_TO, VibrationStatus
+from sagline.dynamics.vibration.vibration import UP_TO, WITH_MODES, VibrationStatus, status_of
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose, PoseLike, pose_of
@@ -133,25 +133,14 @@ def frequency_map(
         model = VibrationModel.of(own)
         for k in range(len(own)):
             index = part.start + k
-            status[index], lowest = _status(model, k)
-            if status[index] not in (VibrationStatus.SOLVED, VibrationStatus.FOLDED):
+            status[index], massless, _ = status_of(model, k)
+            if status[index] not in WITH_MODES:
                 continue
             try:
-                found[:, index] = _numbers_of_pose(own, model, k, limit, known, lowest)
+                found[:, index] = _numbers_of_pose(own, model, k, limit, known, float(massless[0]))
             except SaglineError as error:
                 raise _at_pose(index, error) from None
     return FrequencyMap(robot, poses, limit, known, locked(status), *(locked(row) for row in found))
-
-
-def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
-    """Status of the pose `row`, and the lowest frequency with massless cables [Hz]."""
-    if np.isnan(model.stiffness[row]).any():
-        return VibrationStatus.NO_LENGTHS, np.nan
-    frequency, leaving = model.massless_modes(row)
-    if leaving.shape[1]:
-        return VibrationStatus.UNSTABLE, np.nan
-    taut = model.strings.taut[row].all()
-    return VibrationStatus.SOLVED if taut else VibrationStatus.FOLDED, float(frequency[0])
 
 
 def _numbers_of_pose(

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.core.arrays import Array, Indices
+from sagline.dynamics.vibration.flexibility import flexibility_per_length
 from sagline.kernels.dynamics.collocation import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.kernels.dynamics.string import SMOOTH, TINY
 from sagline.robot.equilibrium import Equilibrium
@@ -198,7 +199,7 @@ def _waves(cable: _StringData, omega: float) -> _Waves:
     below = cable.length - place
     force = cable.force - cable.weight * below[..., None] * _UP
     rates = np.zeros((*place.shape, 6, 6))
-    rates[..., :3, 3:] = _flexible(force, cable.stiffness)
+    rates[..., :3, 3:] = flexibility_per_length(force, cable.stiffness)
     rates[..., 3:, :3] = -cable.density * omega**2 * np.eye(3)
     within = np.einsum("e,st,etij->esitj", size, INTEGRALS, rates).reshape(len(size), 6 * STAGES, 6 * STAGES)
     start = np.tile(np.eye(6), (STAGES, 1))
@@ -213,13 +214,6 @@ def _waves(cable: _StringData, omega: float) -> _Waves:
     found = within_each.reshape(-1, 6, 3)
     share = (size[:, None] * WEIGHTS).reshape(-1)
     return _Waves(force.reshape(-1, 3), below.reshape(-1), share, found[:, :3], found[:, 3:], at.reshape(2, 3, 3))
-
-
-def _flexible(force: Array, stiffness: float) -> Array:
-    """Flexibility per length C at points of the cable with given forces (..., 3), shape (..., 3, 3)."""
-    size = np.linalg.norm(force, axis=-1)[..., None, None]
-    tangent = force[..., :, None] * force[..., None, :] / size**2
-    return np.asarray(np.eye(3) / stiffness + (np.eye(3) - tangent) / size)
 
 
 def _edges(cable: _StringData, omega: float) -> Array:
@@ -254,7 +248,7 @@ def _forms(
         heavier = -np.einsum("p,pab->ab", wave.share * wave.below, turned[..., 2])
         swung = np.einsum("p,pia,pib->ab", wave.share, moved, moved)
         softer = np.einsum("p,pia,pib->ab", wave.share, pulled, pulled)
-        at_frame = _flexible(cable.force - cable.weight * cable.length * _UP, cable.stiffness)
+        at_frame = flexibility_per_length(cable.force - cable.weight * cable.length * _UP, cable.stiffness)
         entered = pull.T @ at_frame @ pull
         end_force.append((wave.end[1] @ pull).T)
         by_force.append(shared)

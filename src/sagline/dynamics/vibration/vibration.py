@@ -36,6 +36,20 @@ class VibrationStatus(Status):
     )
 
 
+WITH_MODES: Final = (VibrationStatus.SOLVED, VibrationStatus.FOLDED)
+
+
+def status_of(model: VibrationModel, row: int) -> tuple[VibrationStatus, Array, Array]:
+    """Status of the state `row`, its frequencies with massless cables (n,) [Hz], and its unstable directions (6, d)."""
+    if np.isnan(model.stiffness[row]).any():
+        return VibrationStatus.NO_LENGTHS, np.full(len(model.freedom), np.nan), np.empty((6, 0))
+    frequency, unstable = model.massless_modes(row)
+    if unstable.shape[1]:
+        return VibrationStatus.UNSTABLE, frequency, unstable
+    taut = model.strings.taut[row].all()
+    return VibrationStatus.SOLVED if taut else VibrationStatus.FOLDED, frequency, unstable
+
+
 _NEAR: Final = 3.0  # a second frequency is reported if its excitation times this factor exceeds the largest
 _INSTANTS: Final = 2000  # number of instants of a segment for its inertial wrench
 
@@ -178,34 +192,29 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
     limit = number(up_to, "up_to", "Hz", above=0.0)
     given = optional(damping, Damping, "damping") or Damping()
     model = VibrationModel.of(state)
-    slack: tuple[int, ...] = tuple(int(i) for i in np.flatnonzero(~model.strings.taut[0]))
-    cables, none = state.cables.shape[-1], np.empty(0)
+    status, massless, unstable = status_of(model, 0)
+    cables, none, count = state.cables.shape[-1], np.empty(0), 0
     arrays = {  # without modes
-        "massless_frequency": np.full(len(model.freedom), np.nan),
-        "negative_directions": np.empty((6, 0)),
+        **{"massless_frequency": massless, "negative_directions": unstable},
         **{"frequency": none, "platform_share": none, "loss": none, "shape": np.empty((6, 0))},
         **{"cable_share": np.empty((cables, 0)), "cable_shape": np.empty((0, cables, POINTS, 3))},
     }
-    status, count = VibrationStatus.NO_LENGTHS, 0
-    if np.isnan(model.stiffness).any():
-        slack = ()
-    else:
-        status = VibrationStatus.UNSTABLE
-        arrays["massless_frequency"], arrays["negative_directions"] = model.massless_modes(0)
-        if not arrays["negative_directions"].shape[1]:
-            status = VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED
-            found = model.modes(0, limit)
-            shares, count = found.cable_shares(), found.number
-            arrays |= {
-                "frequency": found.frequency,
-                "shape": found.platform,
-                "platform_share": np.asarray(1.0 - shares.sum(axis=0)),
-                "cable_share": shares,
-                "cable_shape": found.components.shapes(found.ends, found.amplitudes, POINTS),
-                "loss": found.damping_ratios(state.one_robot.cables.linear_density, shares, given),
-            }
+    if status in WITH_MODES:
+        found = model.modes(0, limit)
+        shares, count = found.cable_shares(), found.number
+        arrays |= {
+            "frequency": found.frequency,
+            "shape": found.platform,
+            "platform_share": np.asarray(1.0 - shares.sum(axis=0)),
+            "cable_share": shares,
+            "cable_shape": found.components.shapes(found.ends, found.amplitudes, POINTS),
+            "loss": found.damping_ratios(state.one_robot.cables.linear_density, shares, given),
+        }
+    slack = () if status is VibrationStatus.NO_LENGTHS else np.flatnonzero(~model.strings.taut[0]).tolist()
     kept = {name: locked(array) for name, array in arrays.items()}
-    return Vibration(state=state, up_to=limit, damping=given, status=status, count=count, slack_cables=slack, **kept)
+    return Vibration(
+        state=state, up_to=limit, damping=given, status=status, count=count, slack_cables=tuple(slack), **kept
+    )
 
 
 def to_shape(modes: Modes | Vibration, path: Path) -> Array:
