@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
@@ -146,10 +147,20 @@ def jax_functions(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
     return {name: np.array(rows) for name, rows in found.items()}
 
 
+def torch_functions(robot: sl.Robot, pose: sl.Pose, folder: Path) -> Answers:
+    """The functions of `sagline.torch`."""
+    import sagline.torch
+
+    inverse = sagline.torch.inverse(robot, pose)
+    forward = sagline.torch.forward(robot, inverse.unstrained_length, near(pose))
+    found = {"length": inverse.unstrained_length, "frame_end_tension": inverse.tension, "position": forward.position}
+    return {name: rows.numpy() for name, rows in found.items()}
+
+
 Host = Callable[[sl.Robot, sl.Pose, Path], Answers]
 HOSTS: Final[tuple[Host, ...]] = (
     c_source, linuxcnc, physics_engine, unit_of_co_simulation, plain_python, web_assembly,
-    jax_functions,
+    jax_functions, *([torch_functions] if find_spec("torch") else []),
 )  # fmt: skip
 QUICK: Final = (c_source, linuxcnc, physics_engine)  # in the first tier, with the first robot
 ROBOTS: Final = ("article-prototype", "ipanema-3-pulleys")

@@ -5,24 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-import sagline.jax
-from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.loads import cable_loads
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS
+from sagline.kinematics.differentiable import InverseKinematics, pull_batch, solve_batch
 from sagline.robot.batch import has_routing
 from sagline.share.machine import courses_at
-from sagline.statics.slopes import KernelStates
 from sagline.statics.stiffness import compliance_of, least_stiffness
 from sagline.statics.tables import body_table, cable_table, pose_rows
-from sagline.tension.method import LIMITS_OF
 from tests.kinematics.test_underconstrained import places, suspended
 from tests.record.poses import METHODS, MODELS
 
@@ -156,15 +153,13 @@ def corner_cases() -> None:
         corner()
 
 
-def lengths_by_inputs(state: sl.Equilibrium) -> Array:
-    """Sensitivities of the lengths of one pose, which only XLA calls in the package, (m, 7 m + 6)."""
-    kernels: Any = vars(sagline.jax.functions)["distribution"]  # as the recorder sees it
-    m, limits = state.cables.shape[-1], LIMITS_OF[state.one_robot.tension_limits_of]
-    found = np.empty((1, m, kernels.LENGTH_COLUMNS * m + 6))
-    (terms, robots, poses, results, memory, states) = next(KernelStates.of(state).parts())
-    goals = np.zeros((1, m))
-    kernels.sensitivities_of_lengths(terms, (limits, np.nan), robots, poses, results, goals, memory, states, found)
-    return found
+def gradients(state: sl.Equilibrium) -> None:
+    """Gradients of the inverse kinematics at one pose."""
+    kinematics = InverseKinematics(state.one_robot, state.cables.model, "inverse")
+    m = state.cables.shape[-1]
+    inputs = pose_rows(state.pose), np.zeros((1, 6)), *(each[None] for each in kinematics.anchors), np.zeros((1, m))
+    lengths, _, results = solve_batch(kinematics, inputs)
+    pull_batch(kinematics, (np.ones((1, m)), np.ones((1, m))), (*inputs, lengths, results))
 
 
 def statics(robot: sl.Robot, count: int) -> None:
@@ -181,7 +176,7 @@ def statics(robot: sl.Robot, count: int) -> None:
     matrix = sl.stiffness(state).matrix[None]
     compliance_of(robot.freedom, matrix)
     least_stiffness(robot.freedom, matrix)
-    lengths_by_inputs(state)
+    gradients(state)
     sl.clearance(state)
     sl.equilibria(robot, state.unstrained_length, starts=10)
     if robot.winches is None:

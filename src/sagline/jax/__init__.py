@@ -4,8 +4,8 @@ The functions call the compiled kernels through the foreign function interface o
 implicit function theorem; docs/howto/jax.md. A pose without a solution has NaN in all results and derivatives.
 """
 
-from sagline.jax.functions import Forward as Forward
-from sagline.jax.functions import HasPose as HasPose
-from sagline.jax.functions import Inverse as Inverse
 from sagline.jax.functions import forward as forward
 from sagline.jax.functions import inverse as inverse
+from sagline.kinematics.differentiable import Forward as Forward
+from sagline.kinematics.differentiable import HasPose as HasPose
+from sagline.kinematics.differentiable import Inverse as Inverse

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import jax
 import numpy as np
 
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.jit import VARIABLE, backend, compiled_library
+from sagline.kinematics.differentiable import Output as Output
+from sagline.kinematics.differentiable import Work
 
 TARGET: Final = "sagline"
 LETTERS: Final = {"float64": "D", "int64": "L", "int8": "B"}
-
-
-class Work(NamedTuple):
-    """Work array of a kernel."""
-
-    shape: tuple[int, ...]
-    dtype: Any
 
 
 @cache
@@ -31,8 +27,8 @@ def register() -> None:
     jax.ffi.register_ffi_target(TARGET, jax.ffi.pycapsule(compiled_library().xla), platform="cpu")
 
 
-def call_kernel(entry: str, *arguments: Any) -> list[Any]:
-    """Results of a kernel. Its arguments are numbers, None, arrays, work arrays and results, in tuples."""
+def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
+    """Outputs of a kernel. Its arguments are numbers, None, arrays, and new arrays for work and output, in tuples."""
     operands: list[Any] = []
     results: list[Any] = []
     numbers: list[float] = []
@@ -41,7 +37,7 @@ def call_kernel(entry: str, *arguments: Any) -> list[Any]:
 
     def form(value: Any) -> str:
         """Format of an argument, as the library declares it."""
-        if isinstance(value, tuple) and not isinstance(value, Work):
+        if isinstance(value, tuple) and not isinstance(value, Work | Output):
             return f"({''.join(map(form, value))})"
         if value is None:
             return "N"
@@ -50,24 +46,21 @@ def call_kernel(entry: str, *arguments: Any) -> list[Any]:
             return "?" if isinstance(value, bool) else "i" if isinstance(value, int) else "f"
         if isinstance(value, Work):
             sizes.extend(value.shape)
+        elif isinstance(value, Output):
+            results.append(jax.ShapeDtypeStruct(*value))
         else:
-            (results if isinstance(value, jax.ShapeDtypeStruct) else operands).append(value)
-        plan.append("s" if isinstance(value, Work) else "r" if isinstance(value, jax.ShapeDtypeStruct) else "a")
+            operands.append(value)
+        plan.append("s" if isinstance(value, Work) else "r" if isinstance(value, Output) else "a")
         return f"{LETTERS[np.dtype(value.dtype).name]}{len(value.shape)}"
 
     text = form(arguments)
     call = jax.ffi.ffi_call(TARGET, results, vmap_method="expand_dims")
     found: list[Any] = call(
         *operands,
-        entry=entry,
+        entry=entry.__name__,
         format=text,
         plan="".join(plan),
         sizes=np.array(sizes, dtype=np.int64),
         numbers=np.array(numbers, dtype=np.float64),
     )
     return found
-
-
-def result_of(*shape: int, dtype: Any = np.float64) -> Any:
-    """Result of a kernel."""
-    return jax.ShapeDtypeStruct(shape, dtype)

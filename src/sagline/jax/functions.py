@@ -1,78 +1,33 @@
 """Forward and inverse kinematics for JAX: functions for `jit`, `vmap` and `grad`, with exact derivatives.
 
-The functions call the compiled kernels through the foreign function interface of XLA. The derivatives are those of the
-implicit function theorem; docs/howto/jax.md. A pose without a solution has NaN in all results and derivatives.
+The functions call the compiled kernels through the foreign function interface of XLA. The derivatives are those of
+`sagline.kinematics.differentiable`; docs/howto/jax.md. A pose without a solution has NaN in all results and
+derivatives.
 """
 
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Final, NamedTuple, Protocol, TypeAlias
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import instance
 from sagline.core.errors import InvalidValueError
-from sagline.jax.calls import Work, call_kernel, register, result_of
-from sagline.kernels import codes, tables
-from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.forward import distribution
-from sagline.kernels.forward.sensitivity import BY_LENGTH, DATA
-from sagline.kernels.memory import memory_for
-from sagline.kinematics.forward_rows import without_guides
-from sagline.kinematics.status import STABLE
-from sagline.robot.batch import has_routing, refuse_slanted
-from sagline.robot.equilibrium import result_rows
+from sagline.jax.calls import call_kernel, register
+from sagline.kinematics.differentiable import (
+    CATENARY,
+    Forward,
+    ForwardKinematics,
+    HasPose,
+    Inverse,
+    InverseKinematics,
+    Kinematics,
+    Value,
+)
 from sagline.robot.robot import Robot
-from sagline.statics.tables import robot_terms
-from sagline.tension.method import LIMITS_OF, check_sharing
-from sagline.tension.methods import DEFAULT
-
-Value: TypeAlias = Any  # an array of JAX or NumPy, or a tracer
-_CATENARY: Final = Catenary()
-
-
-class HasPose(Protocol):
-    """A pose, or a result with position and quaternion."""
-
-    @property
-    def position(self) -> Value:
-        """Position of the platform origin [m], shape (3,)."""
-
-    @property
-    def quaternion(self) -> Value:
-        """Rotation platform -> world, scalar last, shape (4,)."""
-
-
-class Forward(NamedTuple):
-    """Result of `forward`.
-
-    Attributes:
-        position: Position of the platform origin [m], shape (3,).
-        quaternion: Rotation platform -> world, scalar last, shape (4,).
-        tension: Tension at the frame end of each cable [N], shape (m,).
-    """
-
-    position: Value
-    quaternion: Value
-    tension: Value
-
-
-class Inverse(NamedTuple):
-    """Result of `inverse`.
-
-    Attributes:
-        unstrained_length: Length L off the drum [m], shape (m,).
-        tension: Tension at the frame end of each cable [N], shape (m,).
-    """
-
-    unstrained_length: Value
-    tension: Value
 
 
 def forward(
@@ -83,7 +38,7 @@ def forward(
     *,
     frame_anchors: Value | None = None,
     platform_anchors: Value | None = None,
-    model: CableModel | str = _CATENARY,
+    model: CableModel | str = CATENARY,
 ) -> Forward:
     """Equilibrium pose of the platform on cables of given lengths, as a differentiable function of JAX.
 
@@ -115,17 +70,15 @@ def forward(
         >>> lengths = sl.inverse(robot, pose).unstrained_length
         >>> height = lambda lengths: sagline.jax.forward(robot, lengths, pose).position[2]
         >>> print(jax.grad(height)(lengths).round(3))
-        [-0.303 -0.268 -0.259 -0.287 -0.245 -0.198 -0.25  -0.208]
+        [-0.291 -0.321 -0.365 -0.344 -0.378 -0.414 -0.364 -0.325]
 
     Source:
         docs/model.md, section 6.
     """
-    machine = _Machine(robot, model, "forward", slanted=True)
-    anchors = machine.anchors(frame_anchors, platform_anchors)
-    turn = _vector(start.quaternion, 4)
-    row = jax.lax.stop_gradient(jnp.concatenate((_vector(start.position, 3), turn / jnp.linalg.norm(turn))))
-    lengths = _shaped(unstrained_length, "unstrained_length", (machine.cables,))
-    pose, tension = _forward(machine, lengths, _wrench(wrench), *anchors, row)
+    kinematics = _of(ForwardKinematics, robot, model, "forward")
+    lengths = _shaped(unstrained_length, "unstrained_length", (kinematics.cables,))
+    given = _wrench(wrench), *_anchors(kinematics, frame_anchors, platform_anchors)
+    pose, tension = _solve(kinematics, lengths, *given, jax.lax.stop_gradient(_row(start)))
     return Forward(pose[:3], pose[3:], tension)
 
 
@@ -137,7 +90,7 @@ def inverse(
     *,
     frame_anchors: Value | None = None,
     platform_anchors: Value | None = None,
-    model: CableModel | str = _CATENARY,
+    model: CableModel | str = CATENARY,
 ) -> Inverse:
     """Unstrained lengths and tensions at a pose at rest, as a differentiable function of JAX.
 
@@ -174,185 +127,39 @@ def inverse(
     Source:
         docs/model.md, sections 5 and 6.
     """
-    machine = _Machine(robot, model, "inverse", slanted=False)
-    check_sharing(machine.robot, DEFAULT)
-    quaternion = _vector(pose.quaternion, 4)
-    row = jnp.concatenate((_vector(pose.position, 3), quaternion / jnp.linalg.norm(quaternion)))
-    m = machine.cables
+    kinematics = _of(InverseKinematics, robot, model, "inverse")
+    m = kinematics.cables
     goal = jnp.zeros(m) if target is None else _shaped(target, "target", (m,))
-    anchors = machine.anchors(frame_anchors, platform_anchors)
-    return Inverse(*_inverse(machine, row, _wrench(wrench), *anchors, goal))
+    given = _wrench(wrench), *_anchors(kinematics, frame_anchors, platform_anchors)
+    return Inverse(*_solve(kinematics, _row(pose), *given, goal))
 
 
-class _Machine:
-    """Tables of a robot, and calls of the kernels with them."""
-
-    def __init__(self, robot: Robot, model: CableModel | str, function: str, *, slanted: bool) -> None:
-        """Check the robot, the model and the settings of JAX."""
-        if not jax.config.read("jax_enable_x64"):
-            step = 'Call jax.config.update("jax_enable_x64", True) at the beginning of the program.'
-            raise InvalidValueError("jax_enable_x64", False, "True, because poses need double precision", step)
-        register()
-        own = model_of(model)
-        if own.code == codes.STRAIGHT:
-            step = "Use Catenary() or Elastic()."
-            raise InvalidValueError("model", "Straight()", "a cable model with stiffness", step)
-        self.robot = without_guides(instance(robot, Robot, "robot"), f"sagline.jax.{function}", f"sl.{function}")
-        if not slanted:
-            refuse_slanted(robot)
-        self.freedom, self.body, self.table = robot_terms(robot, slanted=True)
-        self.cables, self.free = robot.cable_count, robot.degrees_of_freedom
-        self.model = own.code, *own.parameters
-        self.terms = *self.model, has_routing(robot) or None
-        self.limits = LIMITS_OF[robot.tension_limits_of], float("nan")
-        self.weight = 0.0 if own.weightless else robot.cables.linear_density * robot.gravity
-        self.rows = result_rows(robot)
-        self.memory = tuple(Work(array.shape, array.dtype) for array in memory_for(robot.cable_count))
-
-    def anchors(self, frame: Value | None, platform: Value | None) -> tuple[Value, Value]:
-        """Frame anchors and platform anchors, (m, 3) each."""
-        own, m = self.table[0], self.cables
-        return (
-            jnp.asarray(own[:, :3]) if frame is None else _shaped(frame, "frame_anchors", (m, 3)),
-            jnp.asarray(own[:, 3:6]) if platform is None else _shaped(platform, "platform_anchors", (m, 3)),
-        )
-
-    def robots(self, frame: Value, platform: Value) -> tuple[Value, Value, Value]:
-        """Free motions, body_table and cable_table with the given anchors."""
-        table = jnp.concatenate((frame, platform, self.table[0, :, tables.DENSITY :]), axis=1)
-        return self.freedom, self.body, table[None]
-
-    def states(self) -> tuple[Any, ...]:
-        """Results of `describe_states` for one pose."""
-        m = self.cables
-        shapes = (6, 6), (m, 3, 3), (DATA, m, 3), (m, 3), (m, 3), (m, 7)
-        return tuple(result_of(1, *shape) for shape in shapes)
-
-    def frame_end_tension(self, results: Value) -> Value:
-        """Tensions at the frame ends (m,) of `results` (rows, 1, m)."""
-        length = results[tables.LENGTH, 0]
-        if self.rows > tables.BARE_ROWS:
-            length = length - (results[tables.WRAPPED, 0] + results[tables.DEAD, 0])
-        return jnp.hypot(results[tables.HORIZONTAL, 0], results[tables.VERTICAL, 0] - self.weight * length)
-
-
-def _equilibrium(
-    machine: _Machine, lengths: Value, wrench: Value, frame: Value, platform: Value, start: Value
-) -> tuple[Value, Value]:
-    """Pose (1, POSE_COLUMNS) and results (rows, 1, m) of the forward kinematics; NaN without a stable equilibrium."""
-    m, n = machine.cables, machine.free
-    given = *machine.robots(frame, platform), lengths[None], start[None], wrench[None]
-    works = [Work(shape, np.float64) for shape in ((CABLE_ROWS, m), (n, n), (tables.LAST_COLUMNS,))]
-    outputs = (
-        *(result_of(1, tables.POSE_COLUMNS), result_of(machine.rows, 1, m), result_of(1, m, dtype=np.int8)),
-        *(result_of(1, tables.FORWARD_NUMBERS), result_of(1, dtype=np.int8)),
-    )
-    pose, results, _, _, status = call_kernel(
-        "forward_poses", machine.terms, False, given, tuple(works), machine.memory, outputs
-    )
-    stable = (status[0] == np.array(STABLE)).any()
-    return jnp.where(stable, pose, jnp.nan), jnp.where(stable, results, jnp.nan)
+def _of(kind: type[Kinematics], robot: Robot, model: CableModel | str, function: str) -> Kinematics:
+    """Tables of a robot. Check the settings of JAX first."""
+    if not jax.config.read("jax_enable_x64"):
+        step = 'Call jax.config.update("jax_enable_x64", True) at the beginning of the program.'
+        raise InvalidValueError("jax_enable_x64", False, "True, because poses need double precision", step)
+    register()
+    return kind(robot, model, f"sagline.jax.{function}", jnp, call_kernel)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _forward(machine: _Machine, *arguments: Value) -> tuple[Value, Value]:
-    """Pose row and frame-end tensions; arguments of `_equilibrium`."""
-    pose, results = _equilibrium(machine, *arguments)
-    return pose[0], machine.frame_end_tension(results)
+def _solve(kinematics: Kinematics, *inputs: Value) -> tuple[Value, Value]:
+    """First result and tensions of one sample."""
+    first, tension, _ = kinematics.solve(*(each[None] for each in inputs))
+    return first[0], tension[0]
 
 
-def _forward_jvp(machine: _Machine, primals: Any, tangents: Any) -> tuple[Any, Any]:
-    """Derivative of `_forward` by the implicit function theorem."""
-    m, n = machine.cables, machine.free
-    _, _, frame, platform, _ = primals
-    lengths, wrench, frames, platforms, _ = tangents
-    pose, results = _equilibrium(machine, *primals)
-    shapes = (6, 6), (DATA, 6, m), (6, 3 * m), (6, 3 * m), (m, m), (m, max(m - n, 0))
-    found = call_kernel(
-        *("sensitivities_of_states", machine.terms, machine.robots(frame, platform), pose, results),
-        *(machine.memory, machine.states(), tuple(result_of(1, *shape) for shape in shapes)),
-    )
-    slopes, compliance, by_data, by_frame, by_platform = found[5][0], *(array[0] for array in found[6:10])
-    turn = _matrix(pose[0, 3:])
-    motion, tension = jnp.zeros(6), jnp.zeros(m)
-    if not isinstance(lengths, SymbolicZero):
-        motion, tension = by_data[BY_LENGTH] @ lengths, slopes[:, 6] * lengths
-    if not isinstance(wrench, SymbolicZero):
-        motion += compliance @ wrench
-    if not isinstance(frames, SymbolicZero):
-        motion += by_frame @ frames.reshape(-1)
-        tension -= (slopes[:, :3] * frames).sum(axis=1)
-    if not isinstance(platforms, SymbolicZero):
-        motion += by_platform @ platforms.reshape(-1)
-        tension += (slopes[:, :3] * (platforms @ turn.T)).sum(axis=1)
-    tension += slopes[:, :6] @ motion
-    shift = motion[:3] - _cross(motion[3:], turn @ machine.body[0, tables.CENTER_X :])
-    vector, scalar = pose[0, 3:6], pose[0, 6]
-    change = (
-        0.5 * (scalar * motion[3:] + _cross(motion[3:], vector)),
-        -0.5 * (motion[3:] * vector).sum(keepdims=True),
-    )
-    return (pose[0], machine.frame_end_tension(results)), (jnp.concatenate((shift, *change)), tension)
+def _jvp(kinematics: Kinematics, primals: Any, tangents: Any) -> tuple[Any, Any]:
+    """Results of `_solve` and their changes."""
+    inputs = tuple(each[None] for each in primals)
+    first, tension, results = kinematics.solve(*inputs)
+    changes = [None if isinstance(each, SymbolicZero) else each[None] for each in tangents]
+    slopes = kinematics.derivative(inputs, first, results).push(changes)
+    return (first[0], tension[0]), (slopes[0][0], slopes[1][0])
 
 
-_forward.defjvp(_forward_jvp, symbolic_zeros=True)
-
-
-def _plan(machine: _Machine, row: Value, wrench: Value, frame: Value, platform: Value, goal: Value) -> Value:
-    """Results (rows, 1, m) of the inverse kinematics; NaN if the pose is infeasible."""
-    m, n = machine.cables, machine.free
-    method = codes.QUADRATIC_PROGRAM, 0.0, codes.CHORD_TENSION, jnp.ones(m), goal
-    results, *_ = call_kernel(
-        *("inverse_poses", machine.model, method, machine.limits, machine.robots(frame, platform), row[None]),
-        *(wrench[None], Work((m,), np.float64), machine.memory, None, False),
-        (
-            *(result_of(machine.rows, 1, m), result_of(1, m, dtype=np.int8), result_of(1, 2), result_of(1, n)),
-            result_of(1, dtype=np.int8),
-        ),
-        *(0, 1),
-    )
-    return results
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _inverse(machine: _Machine, *arguments: Value) -> tuple[Value, Value]:
-    """Lengths and frame-end tensions; arguments of `_plan`."""
-    results = _plan(machine, *arguments)
-    return results[tables.LENGTH, 0], machine.frame_end_tension(results)
-
-
-def _inverse_jvp(machine: _Machine, primals: Any, tangents: Any) -> tuple[Any, Any]:
-    """Derivative of `_inverse` by the implicit function theorem, for the active limits."""
-    m = machine.cables
-    row, _, frame, platform, goal = primals
-    results = _plan(machine, *primals)
-    found = call_kernel(
-        *("sensitivities_of_lengths", machine.terms, machine.limits, machine.robots(frame, platform), row[None]),
-        *(results, goal[None], machine.memory, machine.states(), result_of(1, m, distribution.LENGTH_COLUMNS * m + 6)),
-    )
-    levers, slopes, by_inputs = found[3][0], found[5][0], found[6][0]
-    change, wrench, frames, platforms, goals = tangents
-    turn = _matrix(row[3:])
-    ends, arms = jnp.zeros((m, 3)), jnp.zeros((m, 3))  # displacements of platform ends; changes of levers
-    if not isinstance(change, SymbolicZero):
-        vector, scalar = row[3:6], row[6]
-        spin = 2.0 * (scalar * change[3:6] - change[6] * vector + _cross(vector, change[3:6]))
-        ends, arms = change[:3] + _cross(spin, platform @ turn.T), _cross(spin, levers)
-    if not isinstance(platforms, SymbolicZero):
-        moved = platforms @ turn.T
-        ends, arms = ends + moved, arms + moved
-    if not isinstance(frames, SymbolicZero):
-        ends = ends - frames
-    lengths = by_inputs[:, : 3 * m] @ ends.reshape(-1) + by_inputs[:, 3 * m : 6 * m] @ arms.reshape(-1)
-    if not isinstance(goals, SymbolicZero):
-        lengths += by_inputs[:, 6 * m : distribution.LENGTH_COLUMNS * m] @ goals
-    if not isinstance(wrench, SymbolicZero):
-        lengths += by_inputs[:, distribution.LENGTH_COLUMNS * m :] @ wrench
-    tension = (slopes[:, :3] * ends).sum(axis=1) + slopes[:, 6] * lengths
-    return (results[tables.LENGTH, 0], machine.frame_end_tension(results)), (lengths, tension)
-
-
-_inverse.defjvp(_inverse_jvp, symbolic_zeros=True)
+_solve.defjvp(_jvp, symbolic_zeros=True)
 
 
 def _shaped(value: Value, name: str, shape: tuple[int, ...]) -> Value:
@@ -364,27 +171,20 @@ def _shaped(value: Value, name: str, shape: tuple[int, ...]) -> Value:
     return array
 
 
-def _vector(value: Value, size: int) -> Value:
-    return _shaped(value, "position" if size == 3 else "quaternion", (size,))
+def _row(pose: HasPose) -> Value:
+    """Position and unit quaternion, (7,)."""
+    turn = _shaped(pose.quaternion, "quaternion", (4,))
+    return jnp.concatenate((_shaped(pose.position, "position", (3,)), turn / jnp.linalg.norm(turn)))
 
 
 def _wrench(wrench: Value | None) -> Value:
     return jnp.zeros(6) if wrench is None else _shaped(wrench, "wrench", (6,))
 
 
-def _cross(one: Value, other: Value) -> Value:
-    """Cross product of vectors (3,) or (m, 3); shorter compiled code than that of `jnp.cross`."""
-    x, y, z = one[..., 0], one[..., 1], one[..., 2]
-    a, b, c = other[..., 0], other[..., 1], other[..., 2]
-    return jnp.stack((y * c - z * b, z * a - x * c, x * b - y * a), axis=-1)
-
-
-def _matrix(quaternion: Value) -> Value:
-    """Rotation matrix (3, 3) of a unit quaternion (4,)."""
-    x, y, z, w = quaternion
-    rows = (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
-        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
-        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+def _anchors(kinematics: Kinematics, frame: Value | None, platform: Value | None) -> tuple[Value, Value]:
+    """Frame anchors and platform anchors, (m, 3) each."""
+    (of_frame, of_platform), m = kinematics.anchors, kinematics.cables
+    return (
+        jnp.asarray(of_frame) if frame is None else _shaped(frame, "frame_anchors", (m, 3)),
+        jnp.asarray(of_platform) if platform is None else _shaped(platform, "platform_anchors", (m, 3)),
     )
-    return jnp.stack([jnp.stack(row) for row in rows])
