@@ -110,7 +110,9 @@ def _finer(values: Array) -> Array:
     """Values interpolated between those of each row, for pixels of equal width."""
     count = values.shape[1]
     places = (np.arange(FINER * (count - 1)) + 0.5) / FINER
-    return np.array([np.interp(places, np.arange(count), row) for row in values])
+    first = places.astype(np.intp)
+    share = places - first
+    return np.asarray((1.0 - share) * values[:, first] + share * values[:, first + 1])
 
 
 def _segments(found: Any, cut: Slice) -> Array:
