@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -244,12 +245,17 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
     return tuple(deviations)
 
 
+def columns_of(cables: int, modes: int, width: int) -> dict[str, slice]:
+    """Columns of each of the `QUANTITIES` among `width` columns of residuals; `modes`: number of frequencies."""
+    ends = np.cumsum([0, cables, cables, 3, 3, width - 2 * cables - 6 - modes, modes]).tolist()
+    return {name: slice(*part) for name, part in zip(QUANTITIES, pairwise(ends), strict=True)}
+
+
 def _groups(m: int, modes: int, width: int, *, per_cable: bool) -> list[tuple[str, int | None, Indices]]:
     """Quantity, cable and columns of each group of readings; width: number of columns; modes: of frequencies."""
-    ends = np.cumsum([0, m, m, 3, 3, width - 2 * m - 6 - modes, modes])
     found: list[tuple[str, int | None, Indices]] = []
-    for k, name in enumerate(QUANTITIES):
-        columns = np.arange(*ends[k : k + 2])
+    for k, (name, part) in enumerate(columns_of(m, modes, width).items()):
+        columns = np.arange(part.start, part.stop)
         split = per_cable and k in (0, 1, 4) and columns.size > 0
         found += [(name, i, columns[i : i + 1]) for i in range(m)] if split else [(name, None, columns)]
     return found

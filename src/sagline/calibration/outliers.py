@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import chdtrc, gammaln
 
 from sagline.calibration import observations
-from sagline.calibration.findings import QUANTITIES, Outlier
+from sagline.calibration.findings import Outlier, columns_of
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
 from sagline.calibration.parameters import Unknown, parameters_of
@@ -237,11 +236,10 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
             each = zip(taken, fits[best].sizes, fits[best].deviations, strict=True)
             return [Outlier(row, one.cable, one.quantity, size, many) for one, size, many in each]
     off, _ = case.misses()
-    ends = np.cumsum([0, m, m, 3, 3, last - 2 * m - 6, case.modes]).tolist()
-    parts = [slice(first, end) for first, end in pairwise(ends)]
-    worst = int(np.argmax([float(np.nansum((off[part] / case.deviation[part]) ** 2)) for part in parts]))
+    parts = columns_of(m, case.modes, len(case.deviation))
+    worst = max(parts, key=lambda name: float(np.nansum((off[parts[name]] / case.deviation[parts[name]]) ** 2)))
     size = float(np.sqrt(np.nansum(off[parts[worst]] ** 2)))
-    return [Outlier(row, None, QUANTITIES[worst], size, float(np.sqrt(whole.squares)))]
+    return [Outlier(row, None, worst, size, float(np.sqrt(whole.squares)))]
 
 
 def _limit(there: Flags, taken: Sequence[_Suspect], count: int) -> float:

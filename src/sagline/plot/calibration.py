@@ -13,7 +13,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from sagline.calibration.log import count_of_frequencies
+from sagline.calibration.findings import columns_of
+from sagline.calibration.log import count_of_frequencies, reading_deviations
 from sagline.calibration.result import Calibration
 from sagline.calibration.summary import chi_squared_text
 from sagline.core.arguments import choice, instance
@@ -90,22 +91,17 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
 
 def _kinds(found: Calibration) -> list[_Kind]:
     """Residuals of the calibration, one entry per kind of reading."""
-    sensors, m = found.sensors, found.robot.cable_count
+    m, residuals = found.robot.cable_count, found.residuals
+    width = residuals.shape[1]
+    modes = count_of_frequencies(found.sensors, m, width)
+    stated = reading_deviations(found.sensors, m, modes)  # infinite without a sensor
     cables, axes = tuple(f"cable {k}" for k in range(m)), ("$x$", "$y$", "$z$")
-    spans: list[tuple[str, Array | None, slice, tuple[str, ...], str]] = [
-        ("lengths", sensors.length_deviation, slice(0, m), cables, "length"),
-        ("load cells", sensors.tension_deviation, slice(m, 2 * m), cables, "load cell"),
-        ("positions", sensors.position_deviation, slice(2 * m, 2 * m + 3), axes, "position"),
-        ("rotations", sensors.rotation_deviation, slice(2 * m + 3, 2 * m + 6), axes, "rotation"),
-        ("swivel angles", sensors.swivel_deviation, slice(2 * m + 6, 3 * m + 6), cables, "swivel angle"),
-    ]
-    modes = count_of_frequencies(sensors, m, found.residuals.shape[1])
-    width, names = found.residuals.shape[1], tuple(f"mode {k + 1}" for k in range(modes))
-    spans.append(("frequencies", sensors.frequency_deviation, slice(width - modes, width), names, "frequency"))
+    names = cables, cables, axes, axes, cables, tuple(f"mode {k + 1}" for k in range(modes))
+    labels = "lengths", "load cells", "positions", "rotations", "swivel angles", "frequencies"
     return [
-        (label, found.residuals[:, where] / deviation, names, quantity)
-        for label, deviation, where, names, quantity in spans
-        if deviation is not None and np.isfinite(found.residuals[:, where]).any()
+        (label, residuals[:, part] / stated[part], own, quantity)
+        for (quantity, part), label, own in zip(columns_of(m, modes, width).items(), labels, names, strict=True)
+        if np.isfinite(stated[part]).any() and np.isfinite(residuals[:, part]).any()
     ]
 
 

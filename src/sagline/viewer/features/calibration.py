@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.calibration import summary
-from sagline.calibration.findings import CalibrationStatus, Direction
+from sagline.calibration.findings import UNITS, CalibrationStatus, Direction, columns_of
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import count_of_frequencies, reading_deviations
 from sagline.calibration.result import Calibration
@@ -100,15 +100,13 @@ def pose_residuals(found: Calibration, number: int) -> str:
         f"<tr><td>{k}</td>{_cell(row[k], spread[k], 'm')}{_cell(row[m + k], spread[m + k], 'N')}</tr>" for k in range(m)
     )
     cables = f"<table><tr><th>cable</th><th>length</th><th></th><th>load cell</th><th></th></tr>{lines}</table>"
+    axes = {"position": tuple("xyz"), "rotation": ("about x", "about y", "about z")}
     places = "".join(
-        f"<tr><td>{name}</td>{_cell(row[2 * m + axis], spread[2 * m + axis], unit)}</tr>"
-        for axis, (name, unit) in enumerate(
-            [(x, "m") for x in "xyz"]
-            + [(f"about {x}", "rad") for x in "xyz"]
-            + [(f"swivel angle {k}", "rad") for k in range(len(row) - 2 * m - 6 - modes)]
-            + [(f"frequency {k}", "Hz") for k in range(modes)]
-        )
-        if np.isfinite(row[2 * m + axis])
+        f"<tr><td>{axes[quantity][k] if quantity in axes else f'{quantity} {k}'}</td>"
+        f"{_cell(residual, deviation, UNITS[quantity])}</tr>"
+        for quantity, part in list(columns_of(m, modes, len(row)).items())[2:]
+        for k, (residual, deviation) in enumerate(zip(row[part], spread[part], strict=True))
+        if np.isfinite(residual)
     )
     measured = f"<table><tr><th>position</th><th>residual</th><th></th></tr>{places}</table>" if places else ""
     weight = f", counts {n(found.weights[number], '.2g')}" if found.weights[number] < 1.0 else ""
