@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import hypot
+from math import dist
 from typing import Final
 
 import numpy as np
@@ -71,14 +71,14 @@ class StopObserver:
         if self._tell is not None and self.cycles % round(1.0 / PERIOD) == 0:
             self._tell(min(self.cycles / self._expected, 1.0))
         place = self._where()
-        self.misjudged = max(self.misjudged, _apart(place, cycle.position))
+        self.misjudged = max(self.misjudged, dist(place, cycle.position))
         if cycle.state is control.State.IDLE:
             self._stand(place, cycle, answer)
         elif not self._begun:
             self._begun = True
         elif self._plan is not None and np.isfinite(cycle.clock):
             row = min(round(cycle.clock / PERIOD), len(self._plan.status) - 1)
-            self.farthest = max(self.farthest, _apart(place, self._plan.state.pose.position[row]))
+            self.farthest = max(self.farthest, dist(place, self._plan.state.pose.position[row]))
             if self.cycles % EVERY == 0:
                 self.courses.append(
                     np.concatenate(([cycle.clock], answer.tension, cycle.planned_tension, answer.length + cycle.zero))
@@ -267,8 +267,3 @@ def points() -> Array:
 def level_poses(position: ArrayLike) -> sl.Pose:
     """Poses at positions (..., 3), without rotation, as in the article."""
     return sl.Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)
-
-
-def _apart(one: Array, other: Array) -> float:
-    x, y, z = (one - other).tolist()
-    return hypot(x, y, z)

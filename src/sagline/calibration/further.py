@@ -82,7 +82,7 @@ def swivel_rows(
                 slopes[:, i, where[row, i]] += scale[row, i] * change
     residual = np.zeros(reach.shape[:2])
     if readings is not None:
-        residual = wrapped(readings - swivel_angles(robot, poses) - zeros)
+        residual = _wrapped(readings - swivel_angles(robot, poses) - zeros)
     return FurtherRows(residual, slopes, by_length)
 
 
@@ -205,7 +205,7 @@ def _change_data(
             at.inertia[(begin + q) * rows : (begin + q + 1) * rows] += sign * change
 
 
-def wrapped(angles: Array) -> Array:
+def _wrapped(angles: Array) -> Array:
     """Angles between -pi and pi [rad] that differ from `angles` by full turns."""
     return np.asarray(np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi)
 

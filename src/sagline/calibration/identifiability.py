@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from scipy.linalg import null_space
 
 from sagline.calibration.findings import Direction
 from sagline.calibration.further import swivel_senses
@@ -125,19 +126,12 @@ def _admissible_symmetries(
         conditions.append(same[1:] - same[0])
         single[index] = same[0] / frame.scale[index]
     condition = np.vstack(conditions)
-    combined = _null(condition / np.maximum(np.abs(condition).max(axis=1, keepdims=True), _TINY))
+    combined = null_space(condition / np.maximum(np.abs(condition).max(axis=1, keepdims=True), _TINY), rcond=1e-9)
     vectors = single @ combined
     _, size, rows = np.linalg.svd(vectors, full_matrices=False)
     kept = rows[size > _SAME * max(size.max(initial=0.0), _TINY)].T
     shares = np.linalg.norm(single, axis=0)[:, None] * (combined @ kept)
     return vectors @ kept, shares
-
-
-def _null(matrix: Array) -> Array:
-    """Orthonormal basis of the null space of a matrix, as columns."""
-    _, values, rows = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.sum(values > 1e-9 * max(values.max(initial=0.0), _TINY)))
-    return np.asarray(rows[rank:].T)
 
 
 def _echelon(rows: Array) -> Array:

@@ -46,12 +46,6 @@ def counts_at(drums: Drums, lengths: Array) -> Array:
     return drums.counts(lengths * (1.0 + drums.rest_strain))
 
 
-def has_drum_data(robot: Robot) -> bool:
-    """True if the robot has all data of its winches that the computation of lengths from counts needs."""
-    names = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")
-    return robot.winches is not None and all(getattr(robot.winches, name) is not None for name in names)
-
-
 def _known_field(of: Winch | Cable, name: str) -> Array:
     """Value of a field of the winches; `drums_of` has checked that the field is not None."""
     return np.asarray(getattr(of, name))

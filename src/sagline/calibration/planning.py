@@ -14,7 +14,7 @@ from sagline.calibration import information
 from sagline.calibration.candidates import CandidatePoses, candidates_of, shortest_tour, tour_length
 from sagline.calibration.findings import UNITS
 from sagline.calibration.log import READINGS, Sensors
-from sagline.calibration.observations import MachineTerms, has_drum_data, predicted_rows
+from sagline.calibration.observations import MachineTerms, predicted_rows
 from sagline.calibration.parameters import DEFAULT, Parameters, Unknown, correlation_root, parameters_of
 from sagline.core.arguments import callback, instance, optional, whole_number
 from sagline.core.arrays import Array, Flags, Indices, locked
@@ -25,6 +25,7 @@ from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved
 from sagline.robot.batch import refuse_slanted
 from sagline.robot.checks import ROTATING
+from sagline.robot.drum import has_drum_data
 from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors
-from sagline.calibration.observations import MachineTerms, has_drum_data, unwhitened_slopes
+from sagline.calibration.observations import MachineTerms, unwhitened_slopes
 from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, parameters_of
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
@@ -18,6 +18,7 @@ from sagline.kernels import codes
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.uncertainty import Uncertainty
 from sagline.robot.batch import refuse_slanted
+from sagline.robot.drum import has_drum_data
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot, standard_errors
 from sagline.robot.routing import kernel_length

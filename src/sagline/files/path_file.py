@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import numpy as np
 
-from sagline.calibration.observations import counts_at, has_drum_data
+from sagline.calibration.observations import counts_at
 from sagline.core.arguments import file_path
 from sagline.core.arrays import FARTHEST, Array
 from sagline.core.errors import FileError, InvalidValueError
@@ -22,7 +22,7 @@ from sagline.files.writing import write_text
 from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, dump_mapping, parse_mapping, validate
 from sagline.motion.path import Path, path_from_samples
 from sagline.motion.rest_to_rest import quintic_path, septic_path
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import drums_of, has_drum_data
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:

@@ -148,6 +148,12 @@ def drums_of(robot: Robot) -> Drums:
     return Drums(winches, *_tables(winches, diameter), *_limits(winches, robot))
 
 
+def has_drum_data(robot: Robot) -> bool:
+    """True if the robot has all data of its winches that the computation of lengths from counts needs."""
+    names = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")
+    return robot.winches is not None and all(getattr(robot.winches, name) is not None for name in names)
+
+
 def not_given(names: Sequence[str]) -> tuple[str, str]:
     """Item and value of a message about missing fields; names: type and field, such as "winches: drum_radius"."""
     if len(names) == 1:

@@ -26,6 +26,7 @@ from sagline.kernels.dynamics.progress import begin_period
 from sagline.kernels.jit import bound
 from sagline.kinematics.inverse_solver import copy_in
 from sagline.robot.batch import dead_cable
+from sagline.robot.drum import has_drum_data
 from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of
 from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
@@ -133,7 +134,8 @@ class Simulator:
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
         places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
-        self._encoders = Encoders(given.robot, *places) if Encoders.are_on(given.robot) else None
+        counting = has_drum_data(given.robot) and given.robot.cables.diameter is not None
+        self._encoders = Encoders(given.robot, *places) if counting else None
         self._platform = np.empty(body.STATE_COLUMNS)
         self._begin = bound(begin_period, *self._period, numbers=3)
         self._bind()

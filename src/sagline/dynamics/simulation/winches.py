@@ -105,9 +105,6 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
         raise InvalidValueError(f"winches: speed_gain[{i}]", f"{data[d.SPEED_GAIN, i]:g} N s/m", allowed, step)
 
 
-COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # required for encoder counts
-
-
 class Encoders:
     """Encoders on drums."""
 
@@ -119,13 +116,6 @@ class Encoders:
         offset = drums.winches.count_zero + zero * rate
         given = ((drums.table, drums.starts), wound, locked(stretch), locked(offset), locked(rate * 1.0))
         self._read = bound(read_encoders, *given, np.empty((3, 1, m)), self.counts)
-
-    @staticmethod
-    def are_on(robot: Robot) -> bool:
-        """True if `robot` has all data that the computation of encoder counts needs."""
-        winch = robot.winches
-        known = winch is not None and all(getattr(winch, name) is not None for name in COUNTED)
-        return known and robot.cables.diameter is not None
 
     def read(self) -> None:
         """Fill the array of the counts."""
