@@ -80,20 +80,33 @@ def solve_upper(factor: Array, vector: Array) -> None:
         vector[k] /= factor[k, k]
 
 
+@formula
+def _pivot_row(matrix: Array, k: int) -> int:
+    """Row from `k` on with the entry of the largest magnitude in column `k`; -1 without an entry other than 0."""
+    best = k
+    for i in range(k + 1, matrix.shape[0]):
+        if abs(matrix[i, k]) > abs(matrix[best, k]):
+            best = i
+    return best if abs(matrix[best, k]) > 0.0 else -1
+
+
+@formula
+def _exchange_rows(matrix: Array, one: int, other: int, first: int) -> None:
+    """Exchange the entries of two rows from column `first` on."""
+    for j in range(first, matrix.shape[1]):
+        matrix[one, j], matrix[other, j] = matrix[other, j], matrix[one, j]
+
+
 @kernel
 def solve_general(matrix: Array, right: Array) -> bool:
     """Gauss elimination with partial pivoting. Destroys `matrix`; `right` becomes the solution. False if singular."""
     n = matrix.shape[0]
     for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        if not abs(matrix[best, k]) > 0.0:
+        best = _pivot_row(matrix, k)
+        if best < 0:
             return False
         if best != k:
-            for j in range(k, n):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            _exchange_rows(matrix, k, best, k)
             right[k], right[best] = right[best], right[k]
         for i in range(k + 1, n):
             ratio = matrix[i, k] / matrix[k, k]
@@ -121,17 +134,13 @@ def invert_general(matrix: Array, inverse: Array) -> float:
         for j in range(n):
             inverse[i, j] = 1.0 if i == j else 0.0
     for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        if not abs(matrix[best, k]) > 0.0:
+        best = _pivot_row(matrix, k)
+        if best < 0:
             return 0.0
         if best != k:
             determinant = -determinant
-            for j in range(n):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-                inverse[k, j], inverse[best, j] = inverse[best, j], inverse[k, j]
+            _exchange_rows(matrix, k, best, 0)
+            _exchange_rows(inverse, k, best, 0)
         pivot = matrix[k, k]
         determinant *= pivot
         share = 1.0 / pivot

@@ -195,6 +195,23 @@ def free_compliance(
     )
 
 
+@formula
+def _combined(p: float, a: Vector, q: float, b: Vector, r: float, c: Vector) -> Vector:
+    """The vector p a + q b + r c."""
+    return p * a[0] + q * b[0] + r * c[0], p * a[1] + q * b[1] + r * c[1], p * a[2] + q * b[2] + r * c[2]
+
+
+@formula
+def _inverse_of_symmetric(
+    xx: float, xy: float, xz: float, yy: float, yz: float, zz: float
+) -> tuple[float, float, float, float, float, float]:
+    """Inverse of a symmetric matrix (3, 3), with the entries in the order of the arguments."""
+    i00, i01, i02 = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    inverse = 1.0 / (xx * i00 + xy * i01 + xz * i02)
+    i11, i12, i22 = inverse * (xx * zz - xz * xz), inverse * (xy * xz - xx * yz), inverse * (xx * yy - xy * xy)
+    return inverse * i00, inverse * i01, inverse * i02, i11, i12, i22
+
+
 @kernel
 def fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
     """Fill stiffness K [N/m] and dT/dL = -K dB/dL [N/m] of cable `i`. `end`: force at the platform end [N].
@@ -240,12 +257,10 @@ def fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Arr
     inverse = 1.0 / (a0 * i00 + a1 * i10 + a2 * i20)
     turn, swing, grow = radius * inverse, v * inverse, e * inverse
     tx, ty, tz = sine * at.rx + cosine * swivel.x, sine * at.ry + cosine * swivel.y, up
-    p0, p1, p2 = turn * i00, swing * i10, grow * i20
-    ax, ay, az = p0 * tx + p1 * at.sx + p2 * ux, p0 * ty + p1 * at.sy + p2 * uy, p0 * tz + p1 * sz + p2 * uz
-    p0, p1, p2 = turn * i01, swing * i11, grow * i21
-    bx, by, bz = p0 * tx + p1 * at.sx + p2 * ux, p0 * ty + p1 * at.sy + p2 * uy, p0 * tz + p1 * sz + p2 * uz
-    p0, p1, p2 = turn * i02, swing * i12, grow * i22
-    cx, cy, cz = p0 * tx + p1 * at.sx + p2 * ux, p0 * ty + p1 * at.sy + p2 * uy, p0 * tz + p1 * sz + p2 * uz
+    tangent, sideway, forward = (tx, ty, tz), (at.sx, at.sy, sz), (ux, uy, uz)
+    ax, ay, az = _combined(turn * i00, tangent, swing * i10, sideway, grow * i20, forward)
+    bx, by, bz = _combined(turn * i01, tangent, swing * i11, sideway, grow * i21, forward)
+    cx, cy, cz = _combined(turn * i02, tangent, swing * i12, sideway, grow * i22, forward)
     # derivatives of the equations by F, with the opposite sign
     px, py, pz = cosine * at.rx - sine * swivel.x, cosine * at.ry - sine * swivel.y, cosine * rz - sine * nz
     qx, qy, qz = -v * at.sx - moment * ux, -v * at.sy - moment * uy, -v * sz - moment * uz
@@ -260,10 +275,7 @@ def fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Arr
     xy = 0.5 * (ax * py + bx * qy + cx * sy + ay * px + by * qx + cy * sx) + (free_xx - across) * c * s
     xz = 0.5 * (ax * pz + bx * qz + cx * sz + az * px + bz * qx + cz * sx) + free_xz * c
     yz = 0.5 * (ay * pz + by * qz + cy * sz + az * py + bz * qy + cz * sy) + free_xz * s
-    i00, i01, i02 = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
-    inverse = 1.0 / (xx * i00 + xy * i01 + xz * i02)
-    i00, i01, i02 = inverse * i00, inverse * i01, inverse * i02
-    i11, i12, i22 = inverse * (xx * zz - xz * xz), inverse * (xy * xz - xx * yz), inverse * (xx * yy - xy * xy)
+    i00, i01, i02, i11, i12, i22 = _inverse_of_symmetric(xx, xy, xz, yy, yz, zz)
     rows[g.W_XX, i], rows[g.W_XY, i], rows[g.W_XZ, i] = i00, i01, i02
     rows[g.W_YY, i], rows[g.W_YZ, i], rows[g.W_ZZ, i] = i11, i12, i22
     rows[g.LONGER_X, i] = -(i00 * cx + i01 * cy + i02 * cz)

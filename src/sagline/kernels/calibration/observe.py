@@ -217,6 +217,25 @@ ITERATIONS = 3  # iterations of the force balance; few suffice, because the sag 
 LEAST = 0.2  # smallest ratio of a corrected tension to the measured tension
 
 
+@glue
+def _move_into_balance(along: Array, factor: Array, load: Array, tau: Array, least: Array) -> None:
+    """Make the smallest change of the tensions `tau` (m,) that balances `load` (n,), but not below `least` (m,).
+
+    `along`: unit chord wrenches (m, n). `factor`: Cholesky factor of `along`^T `along`. `load` is overwritten.
+    """
+    m, n = along.shape
+    for i in range(m):
+        for j in range(n):
+            load[j] += along[i, j] * tau[i]
+    solve_lower(factor, load)
+    solve_upper(factor, load)
+    for i in range(m):
+        change = 0.0
+        for j in range(n):
+            change += along[i, j] * load[j]
+        tau[i] = max(tau[i] - change, least[i])
+
+
 @entry
 def starting_lengths(
     terms: Terms,
@@ -262,10 +281,8 @@ def starting_lengths(
             tau[i] = chord_tension_at_frame_end(model, chord, material, pulley_at(cables, i), tension[p, i])
             least[i] = LEAST * max(tau[i], 0.5 * material.density * model.gravity * chord.length)
             tau[i] = max(tau[i], least[i])
-            x, y = geometry[g.AZIMUTH_X, i] * chord.cosine, geometry[g.AZIMUTH_Y, i] * chord.cosine
-            rx, ry, rz = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
-            six[0], six[1], six[2] = x, y, chord.sine
-            six[3], six[4], six[5] = ry * chord.sine - rz * y, rz * x - rx * chord.sine, rx * y - ry * x
+            six[:] = 0.0
+            platform.add_force(geometry, i, chord.cosine, chord.sine, six)
             components_along(freedom, six, along[i])
         for j in range(n):
             for k in range(n):
@@ -279,22 +296,11 @@ def starting_lengths(
             for i in range(m):
                 chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)
                 length_out[p, i], sag_force[i], _tension = hold_cable(model, chord, material, pulley, tau[i])
-                six[2] += sag_force[i]
-                six[3] += geometry[g.LEVER_Y, i] * sag_force[i]
-                six[4] -= geometry[g.LEVER_X, i] * sag_force[i]
+                platform.add_force(geometry, i, 0.0, sag_force[i], six)
             components_along(freedom, six, part)
-            for i in range(m):
-                for j in range(n):
-                    part[j] += along[i, j] * tau[i]
             if not positive:
                 break
-            solve_lower(factor, part)
-            solve_upper(factor, part)
-            for i in range(m):
-                change = 0.0
-                for j in range(n):
-                    change += along[i, j] * part[j]
-                tau[i] = max(tau[i] - change, least[i])
+            _move_into_balance(along, factor, part, tau, least)
         for i in range(m):
             chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)
             length_out[p, i] = hold_cable(model, chord, material, pulley, tau[i])[0]

@@ -16,7 +16,7 @@ from sagline.kernels.dynamics.chain import wind_across
 from sagline.kernels.dynamics.drives import Drives, keep_set_points
 from sagline.kernels.dynamics.progress import Courses, Kept
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, VELOCITY, power_of, spin
-from sagline.kernels.forward.platform import unbalance
+from sagline.kernels.forward.platform import add_world_force, unbalance
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import components_along, fill_motion_of_components
@@ -109,19 +109,7 @@ def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, giv
         z = rows[g.SINE, i]
         along = wind[0] * x + wind[1] * y + wind[2] * z
         fx, fy, fz = wind_across(wind, along, x, y, z, 0.5 * drag[i] * rows[g.CHORD, i])
-        _add_at_end(rows, i, fx, fy, fz, given)
-
-
-@kernel
-def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array) -> None:
-    """Add the force (x, y, z) at the platform end of cable `i` to `wrench` (6,)."""
-    rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
-    wrench[0] += x
-    wrench[1] += y
-    wrench[2] += z
-    wrench[3] += ry * z - rz * y
-    wrench[4] += rz * x - rx * z
-    wrench[5] += rx * y - ry * x
+        add_world_force(rows, i, (fx, fy, fz), given)
 
 
 @glue
@@ -201,7 +189,7 @@ def damp_cables(
         lost += more * rate + slow * (ux * ux + uy * uy + uz * uz + both + anchor)
         now[d.ANCHOR_LOSS, i] = slow * (anchor + 0.5 * both) - more * away
         fx, fy, fz = slow * (ux + 0.5 * ax), slow * (uy + 0.5 * ay), slow * (uz + 0.5 * az)
-        _add_at_end(rows, i, -more * x - fx, -more * y - fy, -more * z - fz, wrench)
+        add_world_force(rows, i, (-more * x - fx, -more * y - fy, -more * z - fz), wrench)
     return lost
 
 

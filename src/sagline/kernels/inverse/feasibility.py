@@ -90,12 +90,9 @@ def decide_poses(
             statuses[p] = codes.CABLE_SOLVED
         pose_statuses[p] = status
         farkas[p] = reliefs[p] = math.nan
-        for k in range(n):
-            supplied = demand.right[k]
-            for i in range(m):
-                supplied += demand.hanging[k, i] * change.sag_force[i]
-            needed[p, k] = supplied if k < translations else supplied * lever
-            if status != codes.POSE_SOLVED and brackets[p, tables.ENOUGH] < math.inf:
+        _write_needed(demand, change.sag_force, lever, needed[p])
+        if status != codes.POSE_SOLVED and brackets[p, tables.ENOUGH] < math.inf:
+            for k in range(n):
                 reliefs[p, k] = change.residual[k] if k < translations else 0.0
         if status == codes.POSE_INFEASIBLE and proved:
             _write_proof(demand, change, lever, farkas[p])
@@ -157,6 +154,16 @@ def demand_of_pose(
         for i in range(m):
             size = max(size, cables.low[i])
     return Demand(demand.matrix, demand.hanging, demand.right, demand.soft, size), lever
+
+
+@glue
+def _write_needed(demand: Demand, sag_force: Array, lever: float, needed: Array) -> None:
+    """Fill the wrench that the chord tensions must supply, `needed` (n,), at the sag forces `sag_force` (m,)."""
+    for k in range(needed.size):
+        supplied = demand.right[k]
+        for i in range(sag_force.size):
+            supplied += demand.hanging[k, i] * sag_force[i]
+        needed[k] = supplied if k < demand.soft else supplied * lever
 
 
 @glue

@@ -283,6 +283,30 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
     return codes.POSE_INFEASIBLE if infeasible else status
 
 
+@glue
+def _solve_in_stages(search: _Search, space: UnderconstrainedArrays, given: Indices, level_first: bool) -> int:
+    """Find the equilibrium with the `given` values, after the one with the level instead of the yaw if `level_first`.
+
+    Returns POSE_SOLVED or the failure.
+    """
+    status = codes.POSE_SOLVED
+    for stage in range(0 if level_first else 1, 2):
+        if status == codes.POSE_SOLVED:
+            for i in range(given.size):
+                space.given[i] = codes.LEVEL if stage == 0 and given[i] == codes.YAW else given[i]
+            status = _find_equilibrium(search, space)
+    return status
+
+
+@glue
+def _contains(given: Indices, code: int) -> bool:
+    """True if `code` is one of the given values."""
+    found = False
+    for i in range(given.size):
+        found = found or given[i] == code
+    return found
+
+
 @entry
 def underconstrained_poses(
     model_terms: inverse.ModelTerms,
@@ -318,10 +342,7 @@ def underconstrained_poses(
     balance, rest = statics.new_balance(rest, m, n)
     space, rest = _new_underconstrained_arrays(rest, m, n)
     # Without a level, the tensions must turn the platform to its yaw. The search starts at the solution for level 0.
-    has_yaw = has_level = False
-    for i in range(m):
-        has_yaw = has_yaw or given[i] == codes.YAW
-        has_level = has_level or given[i] == codes.LEVEL
+    has_yaw, has_level = _contains(given, codes.YAW), _contains(given, codes.LEVEL)
     turned_by_tensions = has_yaw and not has_level
     for p in range(first, last):
         platform = inverse.platform_at(robot_terms, starts, wrenches, p)
@@ -344,12 +365,7 @@ def underconstrained_poses(
                 pose[k] = poses[p - 1, k]
             curves, _left = new_curves(model, cables, statuses[p], rest)
             search = _Search(limits, platform, curves, balance, level, lever, pose, blocking[p])
-            status = codes.POSE_SOLVED
-            for stage in range(0 if turned_by_tensions else 1, 2):
-                if status == codes.POSE_SOLVED:
-                    for i in range(m):
-                        space.given[i] = codes.LEVEL if stage == 0 and given[i] == codes.YAW else given[i]
-                    status = _find_equilibrium(search, space)
+            status = _solve_in_stages(search, space, given, turned_by_tensions)
         solved = status == codes.POSE_SOLVED
         if solved:
             inverse.measure_balance(platform, cables, balance, residuals[p])

@@ -6,10 +6,11 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra.factors import solve_lower, solve_upper
+from sagline.kernels.algebra.factors import norm, solve_lower, solve_upper
 from sagline.kernels.cable.sag_forces import Curves
-from sagline.kernels.jit import formula, kernel
+from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
+from sagline.kernels.statics import Triple
 from sagline.kernels.workspaces.box_tensions import Centered, Ranges, factor_normal, in_wrench_space, spread_of_slopes
 from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange, most_of_linear, norm3
 from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, rise, rise_rate, sag_force_slope
@@ -28,6 +29,31 @@ class Precision(NamedTuple):
     rounding: float  # rounding error of a sum, relative to the sum of its terms' magnitudes
 
 
+class _TensionBox(NamedTuple):
+    """Work arrays of a proof of INSIDE for m cables: a box of tensions around the centered tensions."""
+
+    inverse: Array  # weighted pseudo-inverse of the structure matrix, (m, n)
+    change: Array  # change of each tension per newton of each tension, (m, m)
+    hanging: Array  # change of each tension per newton of each sag force, (m, m)
+    slack: Array  # distance of the tensions from their limits [N], (m,)
+    sum: Array  # largest change of the tensions, without their effect on each other [N], (m,)
+    trial: Array  # half edges of the box [N], (m,)
+    low: Array  # smallest tensions in the box [N], (m,)
+    sag_force: Array  # largest change of the sag forces [N], (m,)
+    size: Array  # sum of the magnitudes in each row of the pseudo-inverse, (m,)
+    weight: Array  # weights of the pseudo-inverse, (m,)
+
+
+@glue
+def _new_tension_box(memory: Memory, m: int, n: int) -> tuple[_TensionBox, Memory]:
+    """Work arrays, and the remaining memory."""
+    inverse, memory = block(memory, m, n)
+    change, memory = block(memory, m, m)
+    hanging, memory = block(memory, m, m)
+    rows, memory = block(memory, 7, m)
+    return _TensionBox(inverse, change, hanging, rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]), memory
+
+
 @kernel
 def proves_inside(
     place: CablesInBox,
@@ -44,14 +70,10 @@ def proves_inside(
     centered.give is filled with the change of each tension due to the set of wrenches [N].
     """
     n, m = place.matrix.shape
-    inverse, memory = block(memory, m, n)
-    change, memory = block(memory, m, m)
-    hanging, memory = block(memory, m, m)
-    rows, memory = block(memory, 7, m)
+    room, memory = _new_tension_box(memory, m, n)
     slopes, memory = block(memory, MOTIONS + 2, 6)
-    slack, sum_, trial, low, sag_force, size, weight = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
     along, coefficients = slopes[MOTIONS], slopes[MOTIONS + 1]
-    tau = centered.tau
+    tau, slack, weight = centered.tau, room.slack, room.weight
     for i in range(m):
         slack[i] = min(tau[i] - ranges.low[i], ranges.high[i] - tau[i])
         down, up = tau[i] - centered.low[i], centered.high[i] - tau[i]
@@ -63,85 +85,132 @@ def proves_inside(
     spread_of_slopes(place, box, centered, ranges, slopes)
     largest = 0.0
     for k in range(n):
-        numbers = abs(centered.right[k])
-        for i in range(m):
-            numbers += abs(place.matrix[k, i]) * tau[i]
-        largest = max(largest, numbers)
-    for i in range(m):
-        row = inverse[i]
-        for k in range(n):
-            row[k] = place.matrix[k, i]
-        solve_lower(centered.normal, row)
-        solve_upper(centered.normal, row)
-        size[i] = 0.0
-        for k in range(n):
-            row[k] *= weight[i]
-            size[i] += abs(row[k])
-    error = 0.0
+        largest = max(largest, _sum_of_terms(place, centered, k))
+    error = _fill_inverse(place, centered.normal, room) + precision.rounding
+    possible = error < POOREST_INVERSE
     reaching = 0.0
-    for k in range(n):
-        off = 0.0
-        for j in range(n):
-            total = -1.0 if j == k else 0.0
-            for i in range(m):
-                total += place.matrix[k, i] * inverse[i, j]
-            off += abs(total)
-        error = max(error, off)
     for k in range(n):
         for i in range(m):
             reaching = max(reaching, abs(place.matrix[k, i]))
-    error += precision.rounding
-    possible = error < POOREST_INVERSE
     for i in range(m):
-        in_wrench_space(place.rows, inverse[i], along)
+        in_wrench_space(place.rows, room.inverse[i], along)
         for motion in range(MOTIONS):
             coefficients[motion] = dot6(slopes[motion], along)
         first = most_of_linear(box, coefficients)
         left = 0.0
         for k in range(n):
-            left += inverse[i, k] * centered.left[k]
-        first += abs(left) + precision.rounding * size[i] * largest
-        arm = norm3(along[3], along[4], along[5])
-        bends = 0.0
-        inexact = size[i] * error / (1.0 - error) * reaching
-        for j in range(m):
-            x = along[0] + along[4] * place.lever[2, j] - along[5] * place.lever[1, j]
-            y = along[1] + along[5] * place.lever[0, j] - along[3] * place.lever[2, j]
-            z = along[2] + along[3] * place.lever[1, j] - along[4] * place.lever[0, j]
-            length = norm3(x, y, z)
-            bends += tau[j] * (length * place.bent[j] + arm * (place.swung[j] * place.turned[j] + place.curled[j]))
-            bends += abs(ranges.sag_force[j]) * arm * place.curled[j]
-            change[i, j] = precision.bends * (length * place.turned[j] + arm * place.swung[j]) + inexact
-            hanging[i, j] = abs(z) + arm * place.swung[j]
+            left += room.inverse[i, k] * centered.left[k]
+        first += abs(left) + precision.rounding * room.size[i] * largest
+        inexact = room.size[i] * error / (1.0 - error) * reaching
+        bends = _fill_changes(place, ranges, tau, along, inexact, precision.bends, room.change[i], room.hanging[i])
         most = reach_of_loads(loads, along)
         for a in range(6):
             along[a] = -along[a]
         centered.give[i] = max(most, reach_of_loads(loads, along))
-        sum_[i] = (first + precision.bends * bends + centered.give[i]) * (1.0 + precision.rounding)
-        possible = possible and sum_[i] < slack[i]
-    if not possible:
-        return False
+        room.sum[i] = (first + precision.bends * bends + centered.give[i]) * (1.0 + precision.rounding)
+        possible = possible and room.sum[i] < slack[i]
+    return possible and _keeps_limits(place, curves, tau, room, precision.rounding)
+
+
+@formula
+def _sum_of_terms(place: CablesInBox, centered: Centered, k: int) -> float:
+    """Sum of the magnitudes of the terms of the demand's residual in row `k` [N]."""
+    total = abs(centered.right[k])
+    for i in range(centered.tau.size):
+        total += abs(place.matrix[k, i]) * centered.tau[i]
+    return total
+
+
+@formula
+def _at_platform_end(place: CablesInBox, i: int, direction: Array) -> Triple:
+    """Components of a force at the platform end of cable `i` along a `direction` (6,) of wrenches."""
+    rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
+    x = direction[0] + direction[4] * rz - direction[5] * ry
+    y = direction[1] + direction[5] * rx - direction[3] * rz
+    z = direction[2] + direction[3] * ry - direction[4] * rx
+    return x, y, z
+
+
+@glue
+def _fill_inverse(place: CablesInBox, normal: Array, room: _TensionBox) -> float:
+    """Fill the pseudo-inverse and the sums of its rows. Returns the norm of the error of matrix . pseudo-inverse."""
+    n, m = place.matrix.shape
     for i in range(m):
-        trial[i] = sum_[i]
+        row = room.inverse[i]
+        for k in range(n):
+            row[k] = place.matrix[k, i]
+        solve_lower(normal, row)
+        solve_upper(normal, row)
+        room.size[i] = 0.0
+        for k in range(n):
+            row[k] *= room.weight[i]
+            room.size[i] += abs(row[k])
+    error = 0.0
+    for k in range(n):
+        off = 0.0
+        for j in range(n):
+            total = -1.0 if j == k else 0.0
+            for i in range(m):
+                total += place.matrix[k, i] * room.inverse[i, j]
+            off += abs(total)
+        error = max(error, off)
+    return error
+
+
+@glue
+def _fill_changes(
+    place: CablesInBox,
+    ranges: Ranges,
+    tau: Array,
+    along: Array,
+    inexact: float,
+    bends_weight: float,
+    change: Array,
+    hanging: Array,
+) -> float:
+    """Fill how a tension changes per newton of all tensions and sag forces. Returns its change by bends [N].
+
+    `along`: row of the pseudo-inverse as a direction of wrenches, (6,). `inexact`: error of the pseudo-inverse, per
+    newton. `bends_weight`: `Precision.bends`.
+    """
+    arm = norm3(along[3], along[4], along[5])
+    bends = 0.0
+    for j in range(tau.size):
+        x, y, z = _at_platform_end(place, j, along)
+        length = norm3(x, y, z)
+        bends += tau[j] * (length * place.bent[j] + arm * (place.swung[j] * place.turned[j] + place.curled[j]))
+        bends += abs(ranges.sag_force[j]) * arm * place.curled[j]
+        change[j] = bends_weight * (length * place.turned[j] + arm * place.swung[j]) + inexact
+        hanging[j] = abs(z) + arm * place.swung[j]
+    return bends
+
+
+@glue
+def _keeps_limits(place: CablesInBox, curves: Curves, tau: Array, room: _TensionBox, rounding: float) -> bool:
+    """True if a box of tensions within the limits contains all changes that the tensions of the box cause."""
+    trial, low, sag_force = room.trial, room.low, room.sag_force
+    for i in range(tau.size):
+        trial[i] = room.sum[i]
     for _ in range(ITERATIONS):
-        for i in range(m):
-            low[i] = sum_[i]
-            for j in range(m):
-                low[i] += change[i, j] * trial[j]
-        for i in range(m):
+        for i in range(tau.size):
+            low[i] = room.sum[i]
+            for j in range(tau.size):
+                low[i] += room.change[i, j] * trial[j]
+        for i in range(tau.size):
             trial[i] = low[i]
-    for i in range(m):
-        trial[i] = min(slack[i], HEADROOM * trial[i])
+    for i in range(tau.size):
+        trial[i] = min(room.slack[i], HEADROOM * trial[i])
         low[i] = tau[i] - trial[i]
-    for j in range(m):
+    for j in range(tau.size):
         moved = place.way[j] * sag_force_slope(curves, j, place.way[j], low[j])
         sag_force[j] = moved + trial[j] * max(fall_rate(curves, j, low[j]), rise_rate(curves, j, low[j]))
-    for i in range(m):
-        total = sum_[i]
-        for j in range(m):
-            total += change[i, j] * trial[j] + hanging[i, j] * sag_force[j]
-        possible = possible and total * (1.0 + precision.rounding) < trial[i]
-    return possible
+    kept = True
+    for i in range(tau.size):
+        total = room.sum[i]
+        for j in range(tau.size):
+            total += room.change[i, j] * trial[j] + room.hanging[i, j] * sag_force[j]
+        kept = kept and total * (1.0 + rounding) < trial[i]
+    return kept
 
 
 BORNE = 0.3  # largest share of the gap that a cable between its limits may use
@@ -149,6 +218,7 @@ PIECES = 4  # number of pieces of the range below the tension; the lower end of 
 
 # rows of the cables' contributions along a direction
 VALUE, BENT, SPREAD, HANGING, HANGING_SPREAD, HANGING_BENT = 1, 2, 3, 4, 5, 6
+GIVE, WORK = 0, 7  # weights of the cables, and a work row
 
 
 @kernel
@@ -156,7 +226,6 @@ def proves_outside(
     place: CablesInBox,
     box: PoseRange,
     curves: Curves,
-    smoothing: float,
     centered: Centered,
     ranges: Ranges,
     precision: Precision,
@@ -168,19 +237,15 @@ def proves_outside(
     is slightly corrected, so that the cables between their limits contribute zero or less.
     """
     n, m = place.matrix.shape
-    wide, memory = block(memory, 7 + MOTIONS, m)
+    wide, memory = block(memory, 8, m)
     turns, memory = block(memory, MOTIONS, n)
     slopes, memory = block(memory, 2 * MOTIONS + 2, 6)
     vectors, memory = block(memory, 2, n)
-    give, value, bend, spread = wide[0], wide[1], wide[2], wide[3]
-    each = wide[7:]
+    give, value, bend, spread, work = wide[GIVE], wide[VALUE], wide[BENT], wide[SPREAD], wide[WORK]
     full, direction = slopes[2 * MOTIONS], slopes[2 * MOTIONS + 1]
     tau, y = centered.tau, vectors[0]
     motions = MOTIONS if box.turn > 0.0 else 3
-    length = 0.0
-    for k in range(n):
-        length += centered.left[k] * centered.left[k]
-    length = math.sqrt(length)
+    length = norm(centered.left)
     for k in range(n):
         y[k] = centered.left[k] / length
     for i in range(m):
@@ -194,51 +259,21 @@ def proves_outside(
     spread_of_slopes(place, box, centered, ranges, slopes)
     in_wrench_space(place.rows, y, direction)
     for motion in range(motions):
-        columns = place.slopes[motion].reshape((6, m))
-        for i in range(m):
-            each[motion, i] = 0.0
-            for a in range(6):
-                each[motion, i] += columns[a, i] * direction[a]
-        turn = turns[motion]
-        for k in range(n):
-            turn[k] = 0.0
-            for i in range(m):
-                turn[k] -= place.matrix[k, i] * give[i] * each[motion, i]
-        solve_lower(centered.normal, turn)
-        solve_upper(centered.normal, turn)
-        in_wrench_space(place.rows, turn, slopes[MOTIONS + motion])
+        _turn_direction(place, centered.normal, give, direction, motion, work, turns[motion])
+        in_wrench_space(place.rows, turns[motion], slopes[MOTIONS + motion])
     for attempt in range(2):
         _measure_direction(place, box, direction, slopes[MOTIONS : 2 * MOTIONS], wide)
         for i in range(m):
             bend[i] *= precision.bends
         if attempt == 1:
             break
-        push = vectors[1]
-        push[:] = 0.0
-        for i in range(m):
-            if abs(value[i]) < spread[i] + bend[i]:
-                goal = -bend[i] - value[i]
-                width = ranges.highest[i] - ranges.lowest[i]
-                goal += (
-                    spread[i] * ((tau[i] - ranges.lowest[i]) - (ranges.highest[i] - tau[i])) / width
-                    if width < math.inf
-                    else -spread[i]
-                )
-                for k in range(n):
-                    push[k] += place.matrix[k, i] * give[i] * goal
-        solve_lower(centered.normal, push)
-        solve_upper(centered.normal, push)
-        for k in range(n):
-            y[k] += push[k]
+        _correct_direction(place, centered, ranges, wide, vectors[1], y)
         in_wrench_space(place.rows, y, direction)
     gap = 0.0
     size = 0.0
     for k in range(n):
         gap += y[k] * centered.left[k]
-        numbers = abs(centered.right[k])
-        for i in range(m):
-            numbers += abs(place.matrix[k, i]) * tau[i]
-        size += abs(y[k]) * numbers
+        size += abs(y[k]) * _sum_of_terms(place, centered, k)
     for motion in range(MOTIONS):
         full[motion] = 0.0
         if motion < motions:
@@ -251,6 +286,62 @@ def proves_outside(
         tension = ranges.highest[i] if ranges.highest[i] < math.inf else tau[i]
         size += tension * (abs(value[i]) + spread[i] + bend[i])
     return gap > precision.rounding * size
+
+
+@glue
+def _turn_direction(
+    place: CablesInBox, normal: Array, give: Array, direction: Array, motion: int, work: Array, turn: Array
+) -> None:
+    """Fill the derivative `turn` (n,) of y with respect to a `motion`. `work` (m,) is overwritten."""
+    n, m = place.matrix.shape
+    columns = place.slopes[motion].reshape((6, m))
+    for i in range(m):
+        work[i] = 0.0
+        for a in range(6):
+            work[i] += columns[a, i] * direction[a]
+    for k in range(n):
+        turn[k] = 0.0
+        for i in range(m):
+            turn[k] -= place.matrix[k, i] * give[i] * work[i]
+    solve_lower(normal, turn)
+    solve_upper(normal, turn)
+
+
+@glue
+def _correct_direction(
+    place: CablesInBox, centered: Centered, ranges: Ranges, rows: Array, push: Array, y: Array
+) -> None:
+    """Correct `y` (n,), so that the cables between their limits contribute zero or less. `push` (n,) is overwritten."""
+    n, m = place.matrix.shape
+    value, bend, spread, tau = rows[VALUE], rows[BENT], rows[SPREAD], centered.tau
+    push[:] = 0.0
+    for i in range(m):
+        if abs(value[i]) < spread[i] + bend[i]:
+            goal = -bend[i] - value[i]
+            width = ranges.highest[i] - ranges.lowest[i]
+            goal += (
+                spread[i] * ((tau[i] - ranges.lowest[i]) - (ranges.highest[i] - tau[i])) / width
+                if width < math.inf
+                else -spread[i]
+            )
+            for k in range(n):
+                push[k] += place.matrix[k, i] * rows[GIVE, i] * goal
+    solve_lower(centered.normal, push)
+    solve_upper(centered.normal, push)
+    for k in range(n):
+        y[k] += push[k]
+
+
+@formula
+def _moment_turned(place: CablesInBox, i: int, direction: Array, motion: int) -> Triple:
+    """Change of `_at_platform_end` per rad of the rotation `motion`, 3 to 5, because the lever turns."""
+    rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
+    x, y, z = direction[3], direction[4], direction[5]
+    if motion == 3:
+        return y * ry + z * rz, -x * ry, -x * rz
+    if motion == 4:
+        return -y * rx, z * rz + x * rx, -y * rz
+    return -z * rx, -z * ry, x * rx + y * ry
 
 
 @kernel
@@ -274,32 +365,19 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
             square += length * length
     turned_arm += box.turn * math.sqrt(square)
     for i in range(m):
-        rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
         value = 0.0
         for a in range(6):
             value += direction[a] * place.full[a, i]
-        x = direction[0] + direction[4] * rz - direction[5] * ry
-        y = direction[1] + direction[5] * rx - direction[3] * rz
-        z = direction[2] + direction[3] * ry - direction[4] * rx
+        x, y, z = _at_platform_end(place, i, direction)
         leading, hanging_leading, going = 0.0, 0.0, 0.0
         square, square_value, square_hanging = 0.0, 0.0, 0.0
         for motion in range(motions):
-            turn = turning[motion]
-            vx = turn[0] + turn[4] * rz - turn[5] * ry
-            vy = turn[1] + turn[5] * rx - turn[3] * rz
-            vz = turn[2] + turn[3] * ry - turn[4] * rx
-            if motion == 3:
-                vx += direction[4] * ry + direction[5] * rz
-                vy -= direction[3] * ry
-                vz -= direction[3] * rz
-            elif motion == 4:
-                vx -= direction[4] * rx
-                vy += direction[5] * rz + direction[3] * rx
-                vz -= direction[4] * rz
-            elif motion == 5:
-                vx -= direction[5] * rx
-                vy -= direction[5] * ry
-                vz += direction[3] * rx + direction[4] * ry
+            vx, vy, vz = _at_platform_end(place, i, turning[motion])
+            if motion >= 3:
+                mx, my, mz = _moment_turned(place, i, direction, motion)
+                vx += mx
+                vy += my
+                vz += mz
             slope = place.slopes[motion]
             change = vx * place.full[0, i] + vy * place.full[1, i] + vz * place.full[2, i]
             # here only the derivative of the unit vector contributes

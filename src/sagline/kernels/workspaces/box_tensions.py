@@ -171,6 +171,7 @@ SLACK = 0.45  # up to this X, a frame-end limit changes at most as fast as the s
 # smallest range of the search after the set of wrenches is subtracted, relative to the full range
 LEAST_WIDTH = 0.05
 ITERATIONS = 2  # number of alternating computations of tensions and sag forces
+BEYOND = 2.0  # smoothing per cable; a demand whose residual is larger is infeasible
 LEAST_WAY = 1e-4  # smallest displacement, relative to a chord, from which the smoothing is computed
 
 
@@ -336,13 +337,13 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
 @kernel
 def center_tensions(
     place: CablesInBox, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
-) -> tuple[float, float]:
+) -> bool:
     """Compute centered tensions within the limits of the search, and their sag forces, for `wrench` (6,).
 
-    Returns the square of the residual [N^2], and the smoothing.
+    Returns True if the residual is so large that the demand is infeasible.
     """
     iterations = ITERATIONS if curves.model.code == codes.CATENARY else 1
-    square, smoothing = 0.0, 0.0
+    smoothing = 0.0
     for i in range(centered.tau.size):
         if not centered.low[i] < centered.tau[i] < centered.high[i]:
             centered.tau[i] = 0.5 * (centered.low[i] + centered.high[i])
@@ -351,5 +352,4 @@ def center_tensions(
         smoothing = _smoothing_of(place, geometry, centered.tau)
         find_center(place.matrix, smoothing, centered)
     _fill_demand(curves, place, body, wrench, centered, ranges)
-    square = fill_imbalance(place.matrix, centered)
-    return square, smoothing
+    return fill_imbalance(place.matrix, centered) > BEYOND * centered.tau.size * smoothing

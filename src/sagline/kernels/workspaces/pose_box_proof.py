@@ -11,24 +11,24 @@ import numpy as np
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.sag_forces import new_curves
+from sagline.kernels.cable.sag_forces import Curves, new_curves
 from sagline.kernels.cable.states import TensionLimits
 from sagline.kernels.cable.terms import new_cables
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_at
-from sagline.kernels.jit import entry
+from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import place_cables
 from sagline.kernels.workspaces import box_tensions
 from sagline.kernels.workspaces.box_proofs import Precision, proves_inside, proves_outside
-from sagline.kernels.workspaces.pose_box import PoseRange, new_cables_in_box, set_cables_in_box
+from sagline.kernels.workspaces.pose_box import CablesInBox, PoseRange, new_cables_in_box, set_cables_in_box
 from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_loads
 
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn
 ATTEMPTS = 3  # alternating computations of the tensions and of their limits, which the set of wrenches narrows
-BEYOND = 2.0  # smoothing per cable; a demand whose residual is larger is infeasible
 
 LoadTerms = tuple[Array, Array, Array, Array, Indices]  # Loads
 PrecisionTerms = tuple[float, float]  # Precision
@@ -63,9 +63,7 @@ def prove_boxes(
         memory: `proof_memory` for the number of cables.
         answers: Filled with OPEN, INSIDE or OUTSIDE, (N,); and a work array of statuses, (m,).
     """
-    limits = TensionLimits(*limit_terms)
-    loads = Loads(*load_terms)
-    precision = Precision(*precision_terms)
+    limits, loads, precision = TensionLimits(*limit_terms), Loads(*load_terms), Precision(*precision_terms)
     freedom, bodies, robots = robot_terms
     verdicts, statuses = answers
     body, robot = bodies[0], robots[0]
@@ -81,53 +79,63 @@ def prove_boxes(
     ranges, taken = box_tensions.Ranges(spans[0], spans[1], spans[2], spans[3], spans[4]), spans[5]
     rotation, center, wrench, direction = small[:3, :3], small[3, :3], small[4], small[5]
     several = loads.segments.shape[0] + loads.ellipsoids.shape[0] + loads.sizes.size > 0
-    for k in range(3):
-        center[k] = body[tables.CENTER_X + k]
+    copy(body[tables.CENTER_X : tables.CENTER_X + 3], center)
     for p in range(boxes.shape[0]):
         verdicts[p] = OPEN
         box = PoseRange(boxes[p, 7:10], boxes[p, 10])
         cable_geometry(robot, body, boxes[p], rotation, geometry)
-        if not place_cables(model, limits, robot, geometry, cables):
-            continue
-        if not set_cables_in_box(freedom, geometry, rotation, center, box, place):
+        placed = place_cables(model, limits, robot, geometry, cables)
+        if not (placed and set_cables_in_box(freedom, geometry, rotation, center, box, place)):
             continue
         box_tensions.set_ranges(limits.quantity, place, curves, ranges)
-        for a in range(6):
-            wrench[a] = loads.center[a]
-            direction[a] = 1.0 if a == 2 else 0.0
-        upward = body[tables.MASS] * body[tables.GRAVITY] - wrench[2] + reach_of_loads(loads, direction)
-        box_tensions.tighten(freedom, place, curves, upward, ranges)
-        size = abs(upward)
-        for a in range(6):
-            size += abs(wrench[a])
-        for i in range(m):
-            size += ranges.low[i] + cables.half_weight[i]
-            taken[i] = 0.0
+        size = _tighten_by_load(freedom, body, loads, place, curves, direction, ranges)
+        copy(loads.center, wrench)
+        taken[:] = 0.0
         if not box_tensions.search_limits(ranges, taken, size, centered):
             continue
-        square, smoothing = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
-        outside = square > BEYOND * m * smoothing
-        for attempt in range(ATTEMPTS if several else 1):
-            if outside:
-                break
+        outside = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+        beyond = outside  # of the last search, whose limits the set of wrenches narrows
+        for _ in range(0 if outside else ATTEMPTS if several else 1):
             if proves_inside(place, box, curves, loads, centered, ranges, precision, rest):
                 verdicts[p] = INSIDE
                 break
-            if attempt > 0 and square > BEYOND * m * smoothing:
+            if beyond:
                 break
             if several:
-                for i in range(m):
-                    taken[i] = centered.give[i]
+                copy(centered.give, taken)
                 box_tensions.search_limits(ranges, taken, size, centered)
-                square, smoothing = box_tensions.center_tensions(
-                    place, curves, geometry, body, wrench, centered, ranges
-                )
+                beyond = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
         if several and verdicts[p] == OPEN:
             box_tensions.in_wrench_space(place.rows, centered.left, direction)
             farthest(loads, direction, wrench)
             taken[:] = 0.0
             box_tensions.search_limits(ranges, taken, size, centered)
-            square, smoothing = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
-            outside = square > BEYOND * m * smoothing
-        if outside and proves_outside(place, box, curves, smoothing, centered, ranges, precision, rest):
+            outside = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+        if outside and proves_outside(place, box, curves, centered, ranges, precision, rest):
             verdicts[p] = OUTSIDE
+
+
+@glue
+def _tighten_by_load(
+    freedom: Array,
+    body: Array,
+    loads: Loads,
+    place: CablesInBox,
+    curves: Curves,
+    direction: Array,
+    ranges: box_tensions.Ranges,
+) -> float:
+    """Reduce the largest tensions to the values that the load can cause. Returns the sum of all forces [N].
+
+    `direction` (6,) is overwritten.
+    """
+    direction[:] = 0.0
+    direction[2] = 1.0
+    upward = body[tables.MASS] * body[tables.GRAVITY] - loads.center[2] + reach_of_loads(loads, direction)
+    box_tensions.tighten(freedom, place, curves, upward, ranges)
+    size = abs(upward)
+    for a in range(6):
+        size += abs(loads.center[a])
+    for i in range(ranges.low.size):
+        size += ranges.low[i] + curves.cables.half_weight[i]
+    return size
