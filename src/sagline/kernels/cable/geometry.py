@@ -53,7 +53,7 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
 
 
 @kernel
-def tangent_about(cables: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _tangent_about(cables: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Vector from the pulley of cable `i` along the tangent to the point (`x`, `y`, `z`) relative to the frame anchor.
 
     NaN if no tangent exists. The pulley swivels about the axis of the table, and is in the plane of axis and point.
@@ -88,7 +88,7 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
         geometry[AZIMUTH_X, i] = dx / span if span > 0.0 else 1.0
         geometry[AZIMUTH_Y, i] = dy / span if span > 0.0 else 0.0
         if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-            dx, dy, dz = tangent_about(cables, i, dx, dy, dz)
+            dx, dy, dz = _tangent_about(cables, i, dx, dy, dz)
             span = math.sqrt(dx * dx + dy * dy)
             chord = math.sqrt(span * span + dz * dz)
             sine, cosine = dz / chord, span / chord

@@ -216,7 +216,7 @@ def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> flo
 
 
 @formula
-def closure_error(
+def _closure_error(
     h: float, functions_of_h: tuple[float, float, float], xi2: float, zeta2: float, kappa: float, excess: float
 ) -> tuple[float, float, float]:
     """Error of P2 at h, and its first and second derivatives. `functions_of_h`: sinh h, sinh h - h, and cosh h."""
@@ -242,7 +242,7 @@ def halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float)
     """One Halley step on P2 (docs/model.md, section 2) for h <= 2, without branches."""
     y = h * h
     more = h * y * functions.sinh_excess_polynomial(y)  # sinh h - h
-    error, slope, bend = closure_error(h, (h + more, more, functions.cosh_polynomial(y)), xi2, zeta2, kappa, excess)
+    error, slope, bend = _closure_error(h, (h + more, more, functions.cosh_polynomial(y)), xi2, zeta2, kappa, excess)
     return h - error * slope / (slope * slope - error * bend)
 
 
@@ -256,7 +256,7 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
     h = _parameter_start(xi, zeta, kappa, excess)
     for _ in range(CATENARY_STEPS):
         s, more, c = h * functions.sinhc(h), functions.sinh_excess(h), functions.cosh(h)
-        error, slope, bend = closure_error(h, (s, more, c), xi2, zeta2, kappa, excess)
+        error, slope, bend = _closure_error(h, (s, more, c), xi2, zeta2, kappa, excess)
         if error > 0.0:
             high = h
         else:

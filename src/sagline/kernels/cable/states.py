@@ -278,7 +278,7 @@ class TensionLimits(NamedTuple):
 
 
 @formula
-def sags(model: Model, half_weight: float) -> bool:
+def _sags(model: Model, half_weight: float) -> bool:
     """True if a cable sags, which means an infinite length at zero tension. `half_weight`: wD/2 [N]."""
     return half_weight > 0.0 and model.code != codes.STRAIGHT and model.code != codes.ELASTIC
 
@@ -286,7 +286,7 @@ def sags(model: Model, half_weight: float) -> bool:
 @formula
 def least_of_sag(model: Model, half_weight: float) -> float:
     """Smallest chord tension that the limit of the sag admits [N]."""
-    if sags(model, half_weight):
+    if _sags(model, half_weight):
         return half_weight / LOOSEST
     return SMALLEST if model.code == codes.CATENARY else 0.0
 
@@ -343,9 +343,9 @@ def fill_admissible_tensions(
     # the free span of a slack cable over a pulley can be longer than the tangent by one diameter
     floor = least_of_sag(model, half_weight + cables.density[i] * model.gravity * cables.radius[i])
     chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
-    if sags(model, half_weight):
+    if _sags(model, half_weight):
         floor = max(floor, half_weight * _slackness_beside_axis(chord, pulley))
-    if limits.quantity == codes.LIMITS_OF_FRAME_END and sags(model, half_weight):
+    if limits.quantity == codes.LIMITS_OF_FRAME_END and _sags(model, half_weight):
         low, high = _limits_at_chord(model, chord, material, pulley, low, high, floor)
     if high == math.inf:
         high = _largest_of_strain(model, cables.stiffness[i])

@@ -118,7 +118,7 @@ def _strains(swivel: Swivel, tension: float, zeta: float) -> tuple[float, float,
 
 
 @formula
-def exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
+def _exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
     """Exit point of a cable whose force at the exit point is (`x`, `y`, `z`), toward the platform end [N].
 
     Without weight on the pulley, e_r is in the plane of force and axis. The weight turns it by the angle whose tangent
@@ -159,14 +159,14 @@ def exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
 
 
 @formula
-def point_of(swivel: Swivel, at: Exit) -> Vector:
+def _point_of(swivel: Swivel, at: Exit) -> Vector:
     """Position of the exit point relative to the anchor [m]."""
     v, along = swivel.radius * (1.0 - at.cosine), swivel.radius * at.sine
     return v * at.rx + along * swivel.x, v * at.ry + along * swivel.y, v * at.rz + along * swivel.z
 
 
 @formula
-def free_compliance(
+def _free_compliance(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> tuple[float, float, float, float]:
     """Compliance [m/N] of the free span: dx/dT_x, dx/dT_z = dz/dT_x, dz/dT_z, and x/T_x normal to the plane."""
@@ -213,7 +213,7 @@ def _inverse_of_symmetric(
 
 
 @kernel
-def fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
+def _fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
     """Fill stiffness K [N/m] and dT/dL = -K dB/dL [N/m] of cable `i`. `end`: force at the platform end [N].
 
     The compliance follows from three equations for psi, the swivel angle and the free length: F.e_rho = 0, v F.e_s - k
@@ -268,7 +268,7 @@ def fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Arr
     # the compliance, with the free span
     horizontal = math.sqrt(x * x + y * y)
     c, s = (x / horizontal, y / horizontal) if horizontal > 0.0 else (1.0, 0.0)
-    free_xx, free_xz, free_zz, across = free_compliance(horizontal, end[2], free, w, swivel.stiffness)
+    free_xx, free_xz, free_zz, across = _free_compliance(horizontal, end[2], free, w, swivel.stiffness)
     xx = ax * px + bx * qx + cx * sx + (free_xx * c * c + across * s * s)
     yy = ay * py + by * qy + cy * sy + (free_xx * s * s + across * c * c)
     zz = az * pz + bz * qz + cz * sz + free_zz
@@ -290,15 +290,15 @@ def _end_of(swivel: Swivel, length: float, free: float, force: Vector) -> tuple[
     `length`: unstrained length off the drum [m]. `free`: guess of the free length [m].
     """
     x, y, z = force
-    at = exit_of(swivel, x, y, z - swivel.weight * free)
+    at = _exit_of(swivel, x, y, z - swivel.weight * free)
     for _ in range(LENGTHS):
         new = max(length - (at.wrapped + at.dead), SHORTEST * length)
         change = abs(new - free)
         free = new
         if change <= STILL * length:
             break
-        at = exit_of(swivel, x, y, z - swivel.weight * free)
-    px, py, pz = point_of(swivel, at)
+        at = _exit_of(swivel, x, y, z - swivel.weight * free)
+    px, py, pz = _point_of(swivel, at)
     horizontal = math.sqrt(x * x + y * y)
     span, rise = catenary_end(horizontal, z, free, swivel.weight, swivel.stiffness)
     share = span / horizontal if horizontal > 0.0 else 0.0
@@ -320,8 +320,8 @@ def _force_at(
     for _ in range(ROUNDS):
         if miss <= CLOSED:
             break
-        at = exit_of(swivel, x, y, z - swivel.weight * free)
-        fill_stiffness(swivel, at, (x, y, z), free, rows, i)
+        at = _exit_of(swivel, x, y, z - swivel.weight * free)
+        _fill_stiffness(swivel, at, (x, y, z), free, rows, i)
         dx = _product(rows, i, g.W_XX, g.W_XY, g.W_XZ, (ex, ey, ez))
         dy = _product(rows, i, g.W_XY, g.W_YY, g.W_YZ, (ex, ey, ez))
         dz = _product(rows, i, g.W_XZ, g.W_YZ, g.W_ZZ, (ex, ey, ez))
@@ -397,7 +397,7 @@ def _correct(swivel: Swivel, rows: Array, i: int) -> None:
     turn = 2.0 / (tension + math.sqrt(x * x + y * y + z * z) + TINY)
     give = free * (1.0 / swivel.stiffness + turn * rows[g.SERIES, i])
     lift = free * (1.0 / swivel.stiffness + turn)
-    px, py, pz = point_of(swivel, at)
+    px, py, pz = _point_of(swivel, at)
     ux, uy, uz = rows[g.END_AT_X, i] - px, rows[g.END_AT_Y, i] - py, rows[g.END_AT_Z, i] - pz
     ex, ey, ez = ux - give * x, uy - give * y, uz - lift * (z - 0.5 * swivel.weight * free)
     miss, before = math.sqrt(ex * ex + ey * ey + ez * ez) / length, rows[g.MISS, i]
@@ -447,7 +447,7 @@ def solve_swivels(model: Model, cables: Array, rows: Array) -> None:
                 _fill_any_equivalent_force(swivel_at(cables, i, gravity), rows, i)
         for i in independent(m):
             swivel = swivel_at(cables, i, gravity)
-            at = exit_of(swivel, rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
+            at = _exit_of(swivel, rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
             _store(at, rows[g.LENGTH, i] - (at.wrapped + at.dead), rows, i)
         for i in independent(m):
             _fill_series(swivel_at(cables, i, gravity), rows, i)
@@ -479,7 +479,7 @@ def fill_from_results(model: Model, cables: Array, results: Array, p: int, rows:
         rows[g.LENGTH, i] = results[tables.LENGTH, p, i]
         free = rows[g.LENGTH, i] - (results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i])
         down = z - swivel.weight * free
-        _store(exit_of(swivel, x, y, down), free, rows, i)
+        _store(_exit_of(swivel, x, y, down), free, rows, i)
         rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] = x, y, z
         rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i] = cosine, sine
         rows[g.HORIZONTAL, i], rows[g.VERTICAL, i] = horizontal, z
@@ -522,13 +522,13 @@ def _solve_by_newton(model: Model, cables: Array, rows: Array, i: int) -> None:
     miss, taut = 0.0, force.tension > 0.0 or swivel.weight > 0.0
     if taut:
         x, y, z, free, miss = _force_at(swivel, end, length, (x, y, z, free), rows, i)
-    at = exit_of(swivel, x, y, z - swivel.weight * free)
+    at = _exit_of(swivel, x, y, z - swivel.weight * free)
     if not taut:  # a slack cable without weight leaves its pulley along the tangent
-        at = exit_of(swivel, rows[g.SPAN, i] * cx, rows[g.SPAN, i] * cy, rows[g.RISE, i])
+        at = _exit_of(swivel, rows[g.SPAN, i] * cx, rows[g.SPAN, i] * cy, rows[g.RISE, i])
         free = length - (at.wrapped + at.dead)
     rows[g.PARAMETER, i] = math.nan
     _store(at, free, rows, i)
-    give = free_compliance(math.sqrt(x * x + y * y), z, free, swivel.weight, swivel.stiffness)[3] if taut else math.inf
+    give = _free_compliance(math.sqrt(x * x + y * y), z, free, swivel.weight, swivel.stiffness)[3] if taut else math.inf
     rows[g.TENSION, i] = 1.0 / give  # becomes the chord tension with the chord
     rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] = x, y, z
     rows[g.LEFT, i] = miss
@@ -596,7 +596,7 @@ def _fill_chord(swivel: Swivel, rows: Array, i: int) -> None:
     if horizontal > 0.0:
         inverse = 1.0 / horizontal
         cx, cy = x * inverse, y * inverse
-    px, py, pz = point_of(swivel, _stored(swivel, rows, i))
+    px, py, pz = _point_of(swivel, _stored(swivel, rows, i))
     span, rise = cx * (rows[g.END_AT_X, i] - px) + cy * (rows[g.END_AT_Y, i] - py), rows[g.END_AT_Z, i] - pz
     chord = math.sqrt(span * span + rise * rise)
     inverse = 1.0 / chord
@@ -616,7 +616,7 @@ def stiffness_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> Non
     if rows[g.LEAVING, i] > 0.0:
         swivel = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
         force = (rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
-        fill_stiffness(swivel, _stored(swivel, rows, i), force, rows[g.FREE_LENGTH, i], rows, i)
+        _fill_stiffness(swivel, _stored(swivel, rows, i), force, rows[g.FREE_LENGTH, i], rows, i)
     else:
         for k in range(6):
             rows[g.W_XX + k, i] = 0.0
@@ -708,8 +708,8 @@ def next_exit(swivel: Swivel, robot: Array, i: int, force: Vector, eyelets: Arra
     A motion of the present exit point turns the force, which moves the exit point of the force back by the share R/D
     tan(psi/2) normal to the plane of the pulley. The step is shorter by this share. `chord`: D of the free span [m].
     """
-    at = exit_of(swivel, force[0], force[1], force[2])
-    x, y, z = point_of(swivel, at)
+    at = _exit_of(swivel, force[0], force[1], force[2])
+    x, y, z = _point_of(swivel, at)
     x += robot[i, tables.FRAME_X] - eyelets[i, tables.FRAME_X]
     y += robot[i, tables.FRAME_Y] - eyelets[i, tables.FRAME_Y]
     z += robot[i, tables.FRAME_Z] - eyelets[i, tables.FRAME_Z]

@@ -120,7 +120,7 @@ def plus(a: Triple, b: Triple) -> Triple:
 
 
 @formula
-def scaled(factor: float, vector: Triple) -> Triple:
+def _scaled(factor: float, vector: Triple) -> Triple:
     """A multiple of a vector."""
     return factor * vector[0], factor * vector[1], factor * vector[2]
 
@@ -268,7 +268,7 @@ def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple
         six = space.six
         if j < m:
             own = plus(_tension_by_motion(space.ends, j, space.shares), (0.0, 0.0, space.shares[j, 3]))
-            force = scaled(sensing.gain[j], own)
+            force = _scaled(sensing.gain[j], own)
             moment = cross(_lever_of(space.rows, j), force)
         elif j < m + 3:
             force = _column_of(space.axes, j - m)

@@ -25,7 +25,7 @@ from sagline.kernels.statics import Triple, components_along, symmetric_part, tu
 
 
 @glue
-def whiten(sensing: t.Sensing, residual: Array, space: t.CalibrationArrays) -> None:
+def _whiten(sensing: t.Sensing, residual: Array, space: t.CalibrationArrays) -> None:
     """Omit missing readings, and fill W so that W^T W is the inverse of the covariance."""
     readings, m = space.work.shape[0], residual.size - t.BESIDE
     for j in range(residual.size):
@@ -209,7 +209,7 @@ def observe(
             columns.fill_motion(free, space, answer.motion[p])
         columns.add_motion(space)
         _fill_residual(sensors, readings, p, pose, from_system, space, answer.residual[p])
-        whiten(sensors, answer.residual[p], space)
+        _whiten(sensors, answer.residual[p], space)
         _store_linearization(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)
 
 

@@ -39,7 +39,7 @@ class _Chains(NamedTuple):
     counts: Indices  # numbers of free nodes, (m,)
 
 
-class ChainRun(NamedTuple):
+class _ChainRun(NamedTuple):
     """State and arrays of a run; the fields are the arguments of `chains.run_chains`."""
 
     chains: _Chains
@@ -65,9 +65,9 @@ class ChainRun(NamedTuple):
 
 
 @glue
-def chain_run_of(
+def _chain_run_of(
     rules: Rules, numbers: Numbers, body: Body, data: Array, courses: Courses, kept: Kept, chain_arrays: ChainArrays
-) -> ChainRun:
+) -> _ChainRun:
     """State and arrays of a run from the arguments of `chains.run_chains`."""
     kind, remembered, _stride = rules
     step, gravity, _filtering = numbers
@@ -80,14 +80,14 @@ def chain_run_of(
     target_rates, memory = vector(memory, width)
     lengths, wrenches, winds, _anchors = progress.time_tables(courses)
     drives = d.Drives(kind, remembered > 0, data, now, layers, audit)
-    return ChainRun(
+    return _ChainRun(
         _Chains(*chain_arrays), step, gravity, body[0], body[1], body[2], body[3], drives, lengths, wrenches, winds,
         state, rows, at, targets, target_rates, small[0], small[1], wind, small[2],
     )  # fmt: skip
 
 
 @glue
-def _fill_last_elements(run: ChainRun) -> None:
+def _fill_last_elements(run: _ChainRun) -> None:
     """Fill the remaining length of the element at the frame, and its rate, for every cable."""
     for i in range(run.chains.counts.shape[0]):
         row = run.chains.table[i]
@@ -98,7 +98,7 @@ def _fill_last_elements(run: ChainRun) -> None:
 
 
 @kernel
-def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
+def _follow_time_tables(run: _ChainRun, now: float, shift: float) -> None:
     """Fill the set points of the winches, and the given wrench and wind, at the time `now`."""
     at = run.at
     at[progress.LENGTH_AT] = progress.interpolate_table(
@@ -113,7 +113,7 @@ def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
 
 
 @glue
-def _fill_frame_tensions(run: ChainRun, i: int) -> None:
+def _fill_frame_tensions(run: _ChainRun, i: int) -> None:
     """Fill the tensions of chain `i` at its frame end; they are zero if this end is free."""
     chains, now, n, row = run.chains, run.drives.now, run.chains.counts[i], run.chains.table[i]
     tension, whole, lifted = 0.0, 0.0, 0.0
@@ -128,7 +128,7 @@ def _fill_frame_tensions(run: ChainRun, i: int) -> None:
 
 
 @kernel
-def fill_platform_force(run: ChainRun) -> float:
+def _fill_platform_force(run: _ChainRun) -> float:
     """Fill the force on the platform and the tensions at the winches. Returns the power lost [W]."""
     chains, state = run.chains, run.state
     ends = run.cables[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
@@ -170,7 +170,7 @@ def fill_platform_force(run: ChainRun) -> float:
 
 
 @glue
-def power_of_given_wrench(run: ChainRun) -> float:
+def _power_of_given_wrench(run: _ChainRun) -> float:
     """Power of the given wrench at the present velocities [W]."""
     wx, wy, wz = rigid_body.spin(run.state, run.inertia)
     hx, hy, hz = turned(run.state, run.handle[0], run.handle[1], run.handle[2])
@@ -182,7 +182,7 @@ def power_of_given_wrench(run: ChainRun) -> float:
 
 
 @kernel
-def kick_chains(run: ChainRun, h: float, begins: bool) -> None:
+def _kick_chains(run: _ChainRun, h: float, begins: bool) -> None:
     """Update the nodes' velocities by forces, air and wind during `h`. At the start of a step, forces come last."""
     chains, audit = run.chains, run.drives.audit
     blows = run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0
@@ -206,7 +206,7 @@ GROWTH = 0.5
 
 
 @glue
-def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
+def _energy_of(run: _ChainRun, i: int) -> tuple[float, float]:
     """Energy of chain `i` with its half element at the exit, and energy of this half element [J]."""
     chains, n, row = run.chains, run.chains.counts[i], run.chains.table[i]
     strain, raised = c.potential(chains.place[i], n, row)
@@ -215,7 +215,7 @@ def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
 
 
 @kernel
-def change_node_count(run: ChainRun, i: int) -> None:
+def _change_node_count(run: _ChainRun, i: int) -> None:
     """Add or remove one node of chain `i` at the frame, and add the change of energy to the energy audit."""
     chains, audit = run.chains, run.drives.audit
     row, place, speed, n = chains.table[i], chains.place[i], chains.speed[i], chains.counts[i]
@@ -252,7 +252,7 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
 
 
 @kernel
-def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
+def _record_chain_step(run: _ChainRun, records: Records, stock: Array) -> None:
     """Record a step, and check that the energy does not increase by more than the supplied energy."""
     states, tensions, lengths, energies, _notes, points = records
     state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
@@ -297,38 +297,38 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
 
 
 @glue
-def _split_step(run: ChainRun, now: float) -> None:
+def _split_step(run: _ChainRun, now: float) -> None:
     """Take one step from the time `now`. The stored forces belong to the start of the step, afterwards to its end."""
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
-    drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
+    drives.audit[d.SUPPLIED] += half * _power_of_given_wrench(run)
     rigid_body.kick_body(run.state, run.inertia, run.force, half)
-    kick_chains(run, half, True)
+    _kick_chains(run, half, True)
     d.kick_winches(drives, rows, run.targets, half, True)
     d.store_step_start(drives, rows)
     rigid_body.drift_body(run.state, h)
     rigid_body.free_turn(run.state, run.inertia, h)
     d.turn_winches(drives, run.cables, rows, run.gravity, h)
-    follow_time_tables(run, now + h, -progress.MOMENT * h)
+    _follow_time_tables(run, now + h, -progress.MOMENT * h)
     for i in range(rows.shape[1]):
         row = chains.table[i]
         paid_out = 0.0 if row[c.FREE_END] > 0.0 else rows[g.LENGTH, i] - drives.now[d.BEFORE, i]
         before = row[c.REST] - paid_out
         c.drift_nodes(chains.place[i], chains.speed[i], chains.counts[i], row, before, h)
-    drives.audit[d.LOST] += h * fill_platform_force(run)
+    drives.audit[d.LOST] += h * _fill_platform_force(run)
     d.add_winch_energy(drives, run.cables, rows, h)
     rigid_body.kick_body(run.state, run.inertia, run.force, half)
-    kick_chains(run, half, False)
+    _kick_chains(run, half, False)
     d.kick_winches(drives, rows, run.targets, half, False)
-    drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
+    drives.audit[d.SUPPLIED] += half * _power_of_given_wrench(run)
 
 
 @glue
-def _change_node_counts(run: ChainRun) -> None:
+def _change_node_counts(run: _ChainRun) -> None:
     """Add or remove a node of each chain whose element at the frame is too long or too short."""
     for i in range(run.chains.counts.shape[0]):
         rest, element = run.chains.table[i, c.REST], run.chains.table[i, c.ELEMENT]
         if run.chains.table[i, c.FREE_END] == 0.0 and not c.LEAST * element < rest < c.MOST * element:
-            change_node_count(run, i)
+            _change_node_count(run, i)
 
 
 @entry
@@ -367,22 +367,22 @@ def run_chains(
     """
     kind, _remembered, stride = rules
     step, gravity, filtering = numbers
-    run = chain_run_of(rules, numbers, body, data, courses, kept, chain_arrays)
+    run = _chain_run_of(rules, numbers, body, data, courses, kept, chain_arrays)
     drives, rows, at, audit = run.drives, run.rows, run.at, kept[4]
     if at[progress.READY] == 0:
         at[progress.READY] = 1
         begin = audit[d.BEGIN] + at[progress.STEPS] * step
-        follow_time_tables(run, begin, progress.MOMENT * step)
-        fill_platform_force(run)
+        _follow_time_tables(run, begin, progress.MOMENT * step)
+        _fill_platform_force(run)
         progress.note_events(drives, rows, run.cables, at, begin, gravity, records[4])
-        record_chain_step(run, records, stock)
+        _record_chain_step(run, records, stock)
     elif steps == 0:
-        record_chain_step(run, records, stock)
+        _record_chain_step(run, records, stock)
     for _ in range(steps):
         time = audit[d.BEGIN] + at[progress.STEPS] * step
         if progress.interval_ends(run.lengths, at[progress.LENGTH_AT], time + progress.MOMENT * step):
-            follow_time_tables(run, time, progress.MOMENT * step)  # the rates may jump at this instant
-            fill_platform_force(run)
+            _follow_time_tables(run, time, progress.MOMENT * step)  # the rates may jump at this instant
+            _fill_platform_force(run)
         if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
             d.close_loops(drives, run.targets, run.target_rates, stride * step)
         _split_step(run, time)
@@ -393,6 +393,6 @@ def run_chains(
             drives, rows, run.cables, at, audit[d.BEGIN] + at[progress.STEPS] * step, gravity, records[4]
         )
         if at[progress.STEPS] % every == 0:
-            record_chain_step(run, records, stock)
+            _record_chain_step(run, records, stock)
         if at[progress.FAILED] > 0 or not progress.has_room(at, records[4], rows.shape[1]):
             break

@@ -45,7 +45,7 @@ def _gauss() -> tuple[Array, Array, Array]:
 NODES, WEIGHTS, INTEGRALS = (locked(values) for values in _gauss())  # compiled kernels contain them as constants
 
 
-class Wave(NamedTuple):
+class _Wave(NamedTuple):
     """Terms of the two wave equations at a frequency: mu, and factors of C for transverse and longitudinal waves."""
 
     mu: Any
@@ -54,7 +54,7 @@ class Wave(NamedTuple):
 
 
 @glue
-def fill_flexibility(string: String, wave: Wave, start: float, size: float, normal: bool, c: Numbers) -> None:
+def _fill_flexibility(string: String, wave: _Wave, start: float, size: float, normal: bool, c: Numbers) -> None:
     """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz. For motion normal to the plane, only xx is used."""
     for k in range(STAGES):
         vertical = vertical_at(string, start + NODES[k] * size)
@@ -70,7 +70,7 @@ def fill_flexibility(string: String, wave: Wave, start: float, size: float, norm
 
 
 @glue
-def fill_integral(c: Numbers, size: float, d: int, phi: Numbers) -> None:
+def _fill_integral(c: Numbers, size: float, d: int, phi: Numbers) -> None:
     """Fill the integral of C over an element, (d, d)."""
     for a in range(d):
         for b in range(d):
@@ -130,7 +130,7 @@ def _solve_in_place(system: Numbers, n: int, columns: int) -> None:
 
 
 @glue
-def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Numbers) -> None:
+def _transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Numbers) -> None:
     """Fill the transfer matrix (2 d, 2 d) of an element, which gives (u, f) at its end from (u, f) at its start."""
     n = STAGES * d
     _fill_stages(c, mu, size, d, system)
@@ -242,7 +242,7 @@ def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
 
 @kernel
 def _cable_stiffness_at(
-    string: String, wave: Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
+    string: String, wave: _Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
 ) -> int:
     """Fill K(omega) - K(0) of a cable's platform end, (d, d). Returns the number of natural frequencies below `omega`.
 
@@ -261,13 +261,13 @@ def _cable_stiffness_at(
         size = element_length(string, start, omega, phase)
         last = is_at_end(string, start + size)
         # at zero frequency, a unit force moves the end by the integral of C
-        fill_flexibility(string, Wave(wave.mu, 1.0, 1.0), start, size, d == 1, c)
-        fill_integral(c, size, d, moved)
+        _fill_flexibility(string, _Wave(wave.mu, 1.0, 1.0), start, size, d == 1, c)
+        _fill_integral(c, size, d, moved)
         for a in range(d):
             for b in range(d):
                 whole[a, b] = moved[a, b] + (give[a, b] if number == 0 else whole[a, b])
-        fill_flexibility(string, wave, start, size, d == 1, c)
-        transfer(c, wave.mu, size, d, system, phi)
+        _fill_flexibility(string, wave, start, size, d == 1, c)
+        _transfer(c, wave.mu, size, d, system, phi)
         if number == 0:
             count += _negative_spring_pivots(phi, d, give)
             _first_transfer(phi, d, give, lost, k, moved)
@@ -314,13 +314,13 @@ def dynamic_stiffnesses(
             omega = row[OMEGA].real
             for i in range(strings.shape[1]):
                 string = string_at(strings[p], i)
-                wave = Wave(string.density * row[SQUARE] - row[DRAG], row[ACROSS], row[ALONG])
+                wave = _Wave(string.density * row[SQUARE] - row[DRAG], row[ACROSS], row[ALONG])
                 x, z, y = strings[p, i, BEHIND_X], strings[p, i, BEHIND_Z], strings[p, i, BEHIND_Y]
                 give[0, 0], give[0, 1], give[1, 0], give[1, 1] = x * x, x * z, x * z, z * z
                 for d in (2, 1):
                     count = SINGULAR
                     for mesh in range(MESHES):
-                        other = Wave(wave.mu * (1.0 + ROUNDING * mesh), wave.across, wave.along)
+                        other = _Wave(wave.mu * (1.0 + ROUNDING * mesh), wave.across, wave.along)
                         shorter = phase * (1.0 - SHORTER * mesh)
                         count = _cable_stiffness_at(string, other, omega, shorter, d, give, room, block)
                         if count != SINGULAR:

@@ -101,7 +101,7 @@ def cable_gravity(run: MasslessRun) -> float:
 
 
 @kernel
-def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
+def _add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
     """Add half of the wind force on every cable to the wrench `given` (6,). The force is normal to the chord."""
     for i in range(cables.shape[0]):
         x = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i]
@@ -113,7 +113,7 @@ def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, giv
 
 
 @glue
-def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
+def _project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
     """Remove the components of `wrench` along motions that the platform cannot make. `part` is work memory."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
@@ -194,7 +194,7 @@ def damp_cables(
 
 
 @kernel
-def move_anchors(run: MasslessRun, now: float) -> None:
+def _move_anchors(run: MasslessRun, now: float) -> None:
     """Move the anchors to their positions at the time `now`, and fill their velocities."""
     at = run.at
     at[progress.ANCHOR_AT] = progress.interpolate_table(
@@ -207,7 +207,7 @@ def move_anchors(run: MasslessRun, now: float) -> None:
 
 
 @kernel
-def power_of_anchors(rows: Array, now: Array) -> float:
+def _power_of_anchors(rows: Array, now: Array) -> float:
     """Power of moving anchors on the cables [W], without that of lifting the cables with their anchors."""
     power = 0.0
     for i in range(rows.shape[1]):
@@ -232,7 +232,7 @@ def fill_forces(run: MasslessRun, now: float) -> None:
     at, drives, rows, state = run.at, run.drives, run.rows, run.state
     fill_set_points(run, now, -progress.MOMENT * run.step)
     if tables.MOVES and (run.work & MOVED) > 0:
-        move_anchors(run, now)
+        _move_anchors(run, now)
     if run.work & LOADED:
         at[progress.WRENCH_AT] = progress.interpolate_table(
             run.wrenches, at[progress.WRENCH_AT], now, 0.0, run.given, run.spare
@@ -244,12 +244,12 @@ def fill_forces(run: MasslessRun, now: float) -> None:
         )
         for k in range(6):
             run.gradient[k] += run.given[k]
-        add_wind_on_cables(run.cables, drives.data[d.DRAG], rows, run.before, run.given)
+        _add_wind_on_cables(run.cables, drives.data[d.DRAG], rows, run.before, run.given)
         for k in range(6):
             run.gradient[k] -= run.given[k]
     for k in range(6):
         run.gradient[k] = -run.gradient[k]
-    project_on_freedom(run.freedom, run.gradient, run.spare)
+    _project_on_freedom(run.freedom, run.gradient, run.spare)
     fill_frame_end_tensions(cable_gravity(run), run.cables, rows, drives.data, drives.now, run.model.behind)
 
 
@@ -265,10 +265,10 @@ def fill_damping(run: MasslessRun) -> None:
             drives.audit[d.LOST_POWER] = damp_cables(
                 run.losses, cable_gravity(run), run.cables, run.rows, motion, drives.now, run.damping, run.model.behind
             )
-            project_on_freedom(run.freedom, run.damping, motion)
+            _project_on_freedom(run.freedom, run.damping, motion)
         drives.audit[d.GIVEN_POWER] = power_of(run.given, run.state, spinning)
         if tables.MOVES and (run.work & MOVED) > 0:
-            drives.audit[d.GIVEN_POWER] += power_of_anchors(run.rows, drives.now)
+            drives.audit[d.GIVEN_POWER] += _power_of_anchors(run.rows, drives.now)
 
 
 @glue

@@ -22,7 +22,7 @@ GROWTH = 0.1
 
 
 @kernel
-def record_step(run: massless.MasslessRun, records: massless.Records) -> None:
+def _record_step(run: massless.MasslessRun, records: massless.Records) -> None:
     """Record a step, and check that the energy does not increase by more than the supplied energy."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at
@@ -59,7 +59,7 @@ def record_step(run: massless.MasslessRun, records: massless.Records) -> None:
 
 
 @glue
-def runge_kutta_step(run: massless.MasslessRun, now: float) -> None:
+def _runge_kutta_step(run: massless.MasslessRun, now: float) -> None:
     """One step of the classical Runge-Kutta method. Forces at the step's end replace forces at the step's start."""
     h, drives, rows, state = run.step, run.drives, run.rows, run.state
     m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
@@ -109,7 +109,7 @@ def runge_kutta_step(run: massless.MasslessRun, now: float) -> None:
 
 
 @glue
-def splitting_step(run: massless.MasslessRun, now: float) -> None:
+def _splitting_step(run: massless.MasslessRun, now: float) -> None:
     """One step of the splitting from the time `now`. Forces at the step's end replace forces at the step's start."""
     h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
     massless.fill_damping(run)
@@ -152,7 +152,7 @@ def _start_run(run: massless.MasslessRun, records: massless.Records, room: Array
         for i in range(now.shape[1]):
             now[d.FILTERED, i] = now[d.AT_FRAME, i]
     progress.note_events(run.drives, run.rows, run.cables, at, time, massless.cable_gravity(run), records[4])
-    record_step(run, records)
+    _record_step(run, records)
 
 
 @entry
@@ -196,7 +196,7 @@ def run_massless(
     if at[progress.READY] == 0:
         _start_run(moving, records, kept[6])
     elif steps == 0:
-        record_step(moving, records)
+        _record_step(moving, records)
     for _ in range(steps):
         time = audit[d.BEGIN] + at[progress.STEPS] * step
         if (
@@ -210,9 +210,9 @@ def run_massless(
         if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
             d.close_loops(drives, moving.targets, moving.target_rates, stride * step)
         if integrator == massless.SPLITTING:
-            splitting_step(moving, time)
+            _splitting_step(moving, time)
         else:
-            runge_kutta_step(moving, time)
+            _runge_kutta_step(moving, time)
         at[progress.STEPS] += 1
         d.filter_tensions(drives, filtering)
         progress.note_events(
@@ -225,10 +225,10 @@ def run_massless(
             records[4],
         )
         if every > 0 and at[progress.STEPS] % every == 0:
-            record_step(moving, records)
+            _record_step(moving, records)
             if at[progress.FAILED] > 0:
                 break
         if every > 0 and not progress.has_room(at, records[4], rows.shape[1]):
             break
     if every == 0 and steps > 0:
-        record_step(moving, records)
+        _record_step(moving, records)

@@ -52,7 +52,7 @@ class _Element(NamedTuple):
 
 
 @formula
-def element_from(string: String, omega: float, start: float, first: int) -> _Element:
+def _element_from(string: String, omega: float, start: float, first: int) -> _Element:
     """The element that starts at the material point `start` and the node `first`."""
     size = element_length(string, start, omega, MOST_PHASE)
     vertical = vertical_at(string, start + 0.5 * size)
@@ -76,7 +76,7 @@ def _element_flexibility(string: String, s: float) -> tuple[float, float, float,
 
 
 @kernel
-def add_element(string: String, part: _Element, lobatto: Lobatto, plane: Array, normal: Array) -> None:
+def _add_element(string: String, part: _Element, lobatto: Lobatto, plane: Array, normal: Array) -> None:
     """Add the stiffness of an element: to `plane` with two unknowns per node, to `normal` with one unknown per node."""
     n = part.degree + 1
     slopes = lobatto.slopes[part.degree]
@@ -101,7 +101,7 @@ def add_element(string: String, part: _Element, lobatto: Lobatto, plane: Array, 
 
 
 @kernel
-def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) -> None:
+def _add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) -> None:
     """Fill s and the integral of C from the frame end to each node of an element, and add the mass at each node."""
     n = part.degree + 1
     half = 0.5 * part.size
@@ -123,7 +123,7 @@ def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) ->
 
 
 @kernel
-def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) -> None:
+def _add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) -> None:
     """Add one element's stiffness against stretching to the in-plane stiffness `plane`."""
     n = part.degree + 1
     half = 0.5 * part.size
@@ -140,7 +140,7 @@ def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) 
 
 
 @formula
-def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None:
+def _lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None:
     """Fill the values of the Lagrange polynomials at `place` in [-1, 1], with barycentric weights."""
     total = 0.0
     sign = 1.0
@@ -164,7 +164,7 @@ def node_counts(strings: Array, omega: float, counts: Indices) -> None:
         string = string_at(strings, i)
         start, nodes = 0.0, 0
         for _ in range(100_000):
-            part = element_from(string, omega, start, nodes)
+            part = _element_from(string, omega, start, nodes)
             start, nodes = part.start + part.size, nodes + part.degree
             if is_at_end(string, start):
                 break
@@ -255,9 +255,9 @@ def spectral_matrices(
         points[i, 0, 2], points[i, 0, 3], points[i, 0, 4], points[i, 0, 5] = x * x, x * z, z * z, strings[i, BEHIND_Y]
         start, first = 0.0, 0
         for _ in range(100_000):
-            part = element_from(string, omega, start, first)
-            add_sums(string, part, lobatto, points[i])
-            add_element(string, part, lobatto, plane[i], normal[i])
+            part = _element_from(string, omega, start, first)
+            _add_sums(string, part, lobatto, points[i])
+            _add_element(string, part, lobatto, plane[i], normal[i])
             start, first = part.start + part.size, first + part.degree
             if is_at_end(string, start):
                 break
@@ -294,16 +294,16 @@ def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values:
     for i in range(strings.shape[0]):
         string = string_at(strings, i)
         values[i] = 0.0
-        part = element_from(string, omega, 0.0, 0)
+        part = _element_from(string, omega, 0.0, 0)
         for k in range(count):
             s = string.length * k / (count - 1)
             for _ in range(100_000):
                 end = part.start + part.size
                 if s <= end or is_at_end(string, end):
                     break
-                part = element_from(string, omega, end, part.first + part.degree)
+                part = _element_from(string, omega, end, part.first + part.degree)
             place = min(max(2.0 * (s - part.start) / part.size - 1.0, -1.0), 1.0)
-            lagrange(lobatto, part.degree, place, values[i, k, part.first : part.first + part.degree + 1])
+            _lagrange(lobatto, part.degree, place, values[i, k, part.first : part.first + part.degree + 1])
             for q in range(part.first, part.first + part.degree + 1):
                 values[i, k, q] /= math.sqrt(points[i, q, 1])
 
@@ -318,8 +318,8 @@ def stretch_matrices(strings: Array, omega: float, rule: Rule, points: Array, ma
         matrix[:] = 0.0
         start, first = 0.0, 0
         for _ in range(100_000):
-            part = element_from(string, omega, start, first)
-            add_stretch(string, part, lobatto, matrix)
+            part = _element_from(string, omega, start, first)
+            _add_stretch(string, part, lobatto, matrix)
             start, first = part.start + part.size, first + part.degree
             if is_at_end(string, start):
                 break

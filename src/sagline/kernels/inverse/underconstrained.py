@@ -35,7 +35,7 @@ ITERATIONS = 12  # inverse iterations for the tension level; each reduces the er
 WITHIN = 1e-9  # relative violation of a limit that counts as rounding error
 
 
-class UnderconstrainedArrays(NamedTuple):
+class _UnderconstrainedArrays(NamedTuple):
     """Work arrays for m cables and n free motions."""
 
     jacobian: Array  # derivatives of balance and given values with respect to motion and tensions, (n + m, n + m)
@@ -65,7 +65,7 @@ class _Search(NamedTuple):
 
 
 @glue
-def _new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[UnderconstrainedArrays, Memory]:
+def _new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[_UnderconstrainedArrays, Memory]:
     """Work arrays, and the remaining memory."""
     jacobian, memory = block(memory, n + m, n + m)
     step, memory = vector(memory, n + m)
@@ -76,7 +76,7 @@ def _new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[Underc
     motion, memory = vector(memory, 6)
     moved, memory = vector(memory, tables.POSE_COLUMNS)
     given, memory = counters(memory, m)
-    return UnderconstrainedArrays(
+    return _UnderconstrainedArrays(
         jacobian, step, stiffness, vectors[0], vectors[1], gram, work, motion, moved, vectors[2], given
     ), memory
 
@@ -171,7 +171,7 @@ def _fill_stiffness(cables: Cables, geometry: Array, stiffness: Array) -> None:
 
 
 @glue
-def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
+def _fill_system(search: _Search, space: _UnderconstrainedArrays) -> None:
     """Fill Jacobian and residuals of the balance and of the given values."""
     platform, balance, cables, given = search.platform, search.balance, search.curves.cables, space.given
     pose, start, level = search.pose, platform.pose, search.level
@@ -218,7 +218,7 @@ def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
 
 
 @glue
-def _take_step(search: _Search, space: UnderconstrainedArrays, floor: float) -> tuple[float, bool]:
+def _take_step(search: _Search, space: _UnderconstrainedArrays, floor: float) -> tuple[float, bool]:
     """Move pose and tensions by the shortened step. Returns the step size, and True if a tension is too small.
 
     `floor`: smallest tension of a cable, relative to its smallest admissible tension. `search.blocking` is filled: True
@@ -246,7 +246,7 @@ def _take_step(search: _Search, space: UnderconstrainedArrays, floor: float) -> 
 
 
 @glue
-def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
+def _find_equilibrium(search: _Search, space: _UnderconstrainedArrays) -> int:
     """Take Newton steps until the balance holds. Returns POSE_SOLVED or the failure.
 
     The pose of `search` and the tensions of `space` contain the initial values, and at the end the last values. Steps
@@ -284,7 +284,7 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
 
 
 @glue
-def _solve_in_stages(search: _Search, space: UnderconstrainedArrays, given: Indices, level_first: bool) -> int:
+def _solve_in_stages(search: _Search, space: _UnderconstrainedArrays, given: Indices, level_first: bool) -> int:
     """Find the equilibrium with the `given` values, after the one with the level instead of the yaw if `level_first`.
 
     Returns POSE_SOLVED or the failure.

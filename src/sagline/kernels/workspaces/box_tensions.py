@@ -57,7 +57,7 @@ def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
 
 
 @kernel
-def fill_imbalance(matrix: Array, centered: Centered) -> float:
+def _fill_imbalance(matrix: Array, centered: Centered) -> float:
     """Fill the residual of the demand at the present tensions. Returns the square of the residual's length [N^2]."""
     n, m = matrix.shape
     square = 0.0
@@ -81,7 +81,7 @@ def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> Non
             centered.tau[i] = min(max(centered.tau[i], centered.low[i] + slack), centered.high[i] - slack)
             if not known:
                 centered.tau[i] = centered.low[i] + 0.5 * room
-    square = max(fill_imbalance(matrix, centered) / m, smoothing)
+    square = max(_fill_imbalance(matrix, centered) / m, smoothing)
     for i in range(m):
         centered.below[i] = square / (centered.tau[i] - centered.low[i])
         centered.above[i] = square / (centered.high[i] - centered.tau[i])
@@ -110,7 +110,7 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     n, m = matrix.shape
     tau, low, high, below, above = centered.tau, centered.low, centered.high, centered.below, centered.above
     _start_centering(matrix, smoothing, centered)
-    square = fill_imbalance(matrix, centered)
+    square = _fill_imbalance(matrix, centered)
     for _ in range(STEPS):
         present = 0.0
         worst = 0.0
@@ -162,7 +162,7 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
             below[i] += dual_share * (goal / down - below[i] * (1.0 + step / down))
             above[i] += dual_share * (goal / up - above[i] * (1.0 - step / up))
             tau[i] += share * step
-        square = fill_imbalance(matrix, centered)
+        square = _fill_imbalance(matrix, centered)
     return square
 
 
@@ -352,4 +352,4 @@ def center_tensions(
         smoothing = _smoothing_of(place, geometry, centered.tau)
         find_center(place.matrix, smoothing, centered)
     _fill_demand(curves, place, body, wrench, centered, ranges)
-    return fill_imbalance(place.matrix, centered) > BEYOND * centered.tau.size * smoothing
+    return _fill_imbalance(place.matrix, centered) > BEYOND * centered.tau.size * smoothing

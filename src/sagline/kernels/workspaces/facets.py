@@ -58,7 +58,7 @@ class Facets(NamedTuple):
 
 
 @formula
-def subsets_of(count: int, size: int) -> int:
+def _subsets_of(count: int, size: int) -> int:
     """Number of subsets of `size` elements of a set of `count` elements, for a size of at most AT_ONCE."""
     ways = 1
     for k in range(size):
@@ -165,9 +165,9 @@ def next_subsets(facets: Facets, n: int, size: int) -> tuple[int, int]:
     if size < min(AT_ONCE, n - 1, r):
         size += 1
         for i in range(size - 1 if size > 1 else r, r):  # `choose_basis` fills the minors of single columns
-            _add_column(facets, n, size, i, subsets_of(i, size - 1), subsets_of(i, size))
+            _add_column(facets, n, size, i, _subsets_of(i, size - 1), _subsets_of(i, size))
         chosen[size] = AT_ONCE - 1
-        return size, subsets_of(r, size)
+        return size, _subsets_of(r, size)
     if AT_ONCE <= size < n - 1 and chosen[size] + 1 < r:
         chosen[size + 1] = chosen[size]
         size += 1
@@ -176,7 +176,7 @@ def next_subsets(facets: Facets, n: int, size: int) -> tuple[int, int]:
     if size <= AT_ONCE:
         return -1, 0
     chosen[size] += 1
-    count = subsets_of(chosen[AT_ONCE + 1], AT_ONCE)
+    count = _subsets_of(chosen[AT_ONCE + 1], AT_ONCE)
     _add_column(facets, n, size, chosen[size], count, 0)
     return size, count
 
