@@ -1,5 +1,7 @@
 """Bending cycles along a plan, compared with the states of single elements and with counts by hand."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,18 @@ def test_an_element_that_passes_a_pulley_twice_in_each_motion_back_and_forth(tim
     # elements near both ends of a cable do not bend
     assert (found.pulley[0] == 0.0).all()
     assert (found.tension[found.pulley + found.drum == 0.0] == 0.0).all()
+
+
+def test_the_memory_does_not_grow_with_the_product_of_samples_and_elements() -> None:
+    plan = sl.inverse(ROBOT, there_and_back(2))
+    tracemalloc.start()
+    try:
+        found = sl.bending_cycles(plan, elements=30_000)
+        used = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert used < 20 * found.pulley.nbytes  # samples times elements are 20 MB as flags, 200 MB as tensions
+    assert (found.drum.max(axis=0) == 2.0).all()
 
 
 def test_a_cable_without_a_pulley_bends_on_the_drum_only() -> None:

@@ -97,8 +97,10 @@ def bending_cycles(plan: Plan, elements: int = 500) -> BendingCycles:
         for i in range(robot.cable_count):
             if which == 0 and robot.winches.pulley_radius[i] == 0.0:
                 continue
-            beyond = position[None] > end[:, i, None]
-            events = beyond[1:] != beyond[:-1]  # (N - 1, K)
-            counts[which, :, i] += 0.5 * events.sum(axis=0)
-            largest[:, i] = np.maximum(largest[:, i], (events * tension[:, i, None]).max(axis=0, initial=0.0))
+            beyond = np.searchsorted(position, end[:, i], side="right")  # first element beyond the end, (N,)
+            first, last = np.minimum(beyond[1:], beyond[:-1]), np.maximum(beyond[1:], beyond[:-1])
+            for step in np.flatnonzero(first < last):  # elements that pass the end
+                part = slice(first[step], last[step])
+                counts[which, part, i] += 0.5
+                largest[part, i] = np.maximum(largest[part, i], tension[step, i])
     return BendingCycles(plan, locked(position), locked(counts[0]), locked(counts[1]), locked(largest))

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import ClassVar, Final, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +34,8 @@ from sagline.tension.method import TensionMethod, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
 SHARE = 1e-5  # step relative to the time scale of the motion; central differences are then accurate to 1e-9
-# factor of the step for one-sided differences, because their rounding errors are four times as large; they are accurate
-# to 1e-8
-ONE_SIDED = 4.0
+ONE_SIDED = 4.0  # factor of the step for one-sided differences, whose rounding errors are four times as large
 LONGEST = 1e-2  # largest step relative to the time between samples
-# loaded by name on demand, because calibration imports this module
-_UNCERTAINTY: Final = "sagline.calibration.uncertainty"
 _CONSTANT = 1e-9  # differences of a wrench below this share of its largest component count as zero
 
 
@@ -50,8 +46,7 @@ class Gap(NamedTuple):
         first: Index of the first pose.
         last: Index of the last pose.
         status: Reason for the missing solution at the first pose, or UNSTABLE.
-        shortfall: Largest finite shortfall in the gap [N]. Infinite if all shortfalls are infinite, NaN if no shortfall
-            is known.
+        shortfall: Largest finite shortfall in the gap [N]; infinite if all are infinite, NaN if none is known.
         cables: Indices of the cables whose limits oppose the wrench at any pose of the gap.
         hopeless: Number of poses of the gap that no change of the force alone makes feasible.
     """
@@ -86,19 +81,20 @@ class Plan(Result, Saved, Tabular):
             less than y . (needed without its sag forces). The proof uses exact catenaries. The proof excludes tensions
             below a tenth of the cable's weight, and, for a cable without an upper limit, tensions that stretch it to
             more than twice its length. The force part of y has length 1, so that the difference is in newtons. NaN if
-            the proof needs more than one direction. None for a plan from an old file.
+            the proof needs more than one direction.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6), due to weight, given wrench,
             and the sag forces T_z - tau sin phi. Without a solution, the sag forces belong to the tensions with the
-            smallest unbalanced wrench. None for a plan from an old file.
+            smallest unbalanced wrench.
         bracket: Proved lower bound of the shortfall, and a sufficient value [N], shape (2,) or (N, 2). The sufficient
-            value is infinite if none was found. None for a plan from an old file.
+            value is infinite if none was found.
         relief: Change of the force that makes the pose feasible, in world axes [N], shape (3,) or (N, 3). Its magnitude
-            is the sufficient value in `bracket`. NaN if no change is needed or known. None for a plan from an old file.
+            is the sufficient value in `bracket`. NaN if no change is needed or known.
         at_border: True for feasible poses at which the iterations found no tensions, close to the border of
-            feasibility, shape () or (N,). The tensions at such poses balance the platform, but the tension distribution
-            method did not select the tensions. None for a plan from an old file.
+            feasibility, shape () or (N,). The tensions there balance the platform, but `tension` did not select them.
         anchors: Motion of the frame anchors; None for fixed anchors. With moving anchors, `state.robot` has one robot
             per pose, whose frame anchors are those at its time.
+
+    `farkas`, `needed`, `bracket`, `relief` and `at_border` are None for a plan from an old file.
     """
 
     _columns: ClassVar[Columns] = (
@@ -248,10 +244,10 @@ class Plan(Result, Saved, Tabular):
             2.92 mm, mostly frame_anchors
 
         Source:
-            Implicit function theorem at each equilibrium, with the derivatives of `calibrate`: docs/model.md, section
-            14.
+            Implicit function theorem, with the derivatives of `calibrate`: docs/model.md, section 14.
         """
-        found: Uncertainty = import_module(_UNCERTAINTY).uncertainty_of(self)
+        # loaded by name on demand, because calibration imports this module
+        found: Uncertainty = import_module("sagline.calibration.uncertainty").uncertainty_of(self)
         return found
 
     @property
@@ -310,17 +306,15 @@ class Plan(Result, Saved, Tabular):
 def _length_rate(plan: Plan, path: Path) -> Array:
     """Rates of the unstrained lengths (N, m) along `path`; NaN where the plan has no solution.
 
-    The rates are accurate to 1e-8 of the largest rate. At the border of feasibility, the rates have first order.
+    The rates are accurate to 1e-8 of the largest rate, and have first order at the border of feasibility.
     """
     # Geometry and tensions both change: L(t) = L(pose(t), tau(t)). The tensions of most methods depend only on the
-    # pose. They are computed again shortly before and after each sample, at poses that follow from twist, twist rate
-    # and jerk of the path. `Closest` depends on its previous tensions. It is solved again one step and two steps after
-    # each sample, in both cases relative to the tensions at the sample. At a discontinuity of the rate, for example
-    # where a cable reaches a limit, the value belongs to one side of the discontinuity. The rates of an
-    # underconstrained platform follow from a spline through its lengths. See docs/model.md, section 7.
+    # pose. They are computed again shortly before and after each sample. `Closest` depends on its previous tensions.
+    # It is solved again one step and two steps after each sample, relative to the tensions at the sample. At a
+    # discontinuity, for example where a cable reaches a limit, the rate belongs to one side of the discontinuity.
     state, tension, anchors = plan.state, plan.tension, plan.anchors
     kept, rates = np.flatnonzero(plan.feasible), np.full(state.cables.shape, np.nan)
-    # the platform also turns by an angle that the path does not contain, or the exit points need passes of their own
+    # a spline, because the path does not contain all of the pose, or the exit points need passes of their own
     if is_underconstrained(first_of(state.robot)) or has_slanted_axes(state.robot):
         for part in np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1):
             if len(part) > 1:
@@ -359,8 +353,7 @@ def lengths_near(
     options, terms = kernel_options(robot, state.cables.model, tension), robot_terms(robot, anchors=places)
     found = solve_inverse_rows(robot, tension, options, pose_rows(pose), locked(wrench), reference, terms=terms)
     if state.contact is None:
-        bare: Array = found.results[tables.LENGTH]
-        return bare
+        return np.asarray(found.results[tables.LENGTH])
     reached = cables_of_results(robot, state.cables.model, found.results, found.cable_status, pose.shape)
     placed = robot if places is None else with_anchors(first_of(robot), places)
     return with_routing(Equilibrium(placed, pose, wrench, *reached), state.contact.winding).unstrained_length
@@ -370,15 +363,15 @@ def _motion_near(
     robot: Robots, path: Path, wrench: Array, longer: float, anchors: AnchorMotion | None
 ) -> tuple[Callable[[float], tuple[Pose, Array]], float]:
     """A function that returns poses and wrenches at a time after each sample of `path`, and a time step [s] for it."""
-    # wrench: external plus inertial wrench at the samples, (N, 6); a spline interpolates its external part; longer:
-    # factor of the step
+    # wrench: external plus inertial, (N, 6); a spline interpolates its external part; longer: factor of the step
     jerk = path.jerk if path.jerk is not None else _rate(path.time, path.twist_rate)
     external = wrench - inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
     changing = float(np.ptp(external, axis=0).max()) > _CONSTANT * float(np.abs(wrench).max())
     external_rate = _rate(path.time, external) if changing else np.zeros_like(external)
 
     def at(h: float) -> tuple[Pose, Array]:
-        pose = _poses_later(path, jerk, h)
+        # third order for positions, second for orientations (third if the axis is constant)
+        pose = moved_pose(path.pose, h * (path.twist + 0.5 * h * (path.twist_rate + h / 3.0 * jerk)))
         twist = path.twist + h * (path.twist_rate + 0.5 * h * jerk)
         inertial = inertial_wrench(robot, pose, twist, path.twist_rate + h * jerk)
         return pose, inertial + external + h * external_rate
@@ -397,12 +390,11 @@ def _rate(time: Array, values: Array) -> Array:
     return spline_rates(time, values)[0] if len(time) > 1 else np.zeros_like(values)
 
 
-def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
-    """Poses after the time `h`. The order is 3 for positions, and 2 for orientations (3 if the axis is constant)."""
+def moved_pose(pose: Pose, motions: Array) -> Pose:
+    """Poses after `motions` (N, 6): shifts of the origin [m] and rotation vectors [rad] in world axes."""
     from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
-    move = h * (path.twist + 0.5 * h * (path.twist_rate + h / 3.0 * jerk))
-    turned = path.pose.quaternion
-    if path.twist[:, 3:].any() or path.twist_rate[:, 3:].any():
-        turned = (Rotation.from_rotvec(move[:, 3:]) * path.pose.rotation).as_quat()
-    return Pose.from_quaternion(path.pose.position + move[:, :3], turned)
+    turned = pose.quaternion
+    if motions[:, 3:].any():
+        turned = (Rotation.from_rotvec(motions[:, 3:]) * pose.rotation).as_quat()
+    return Pose.from_quaternion(pose.position + motions[:, :3], turned)

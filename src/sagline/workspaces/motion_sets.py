@@ -9,17 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
-from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.trajectories.fastest import fastest_rates
-from sagline.kinematics.plan import lengths_near
+from sagline.kinematics.plan import lengths_near, moved_pose
 from sagline.robot.batch import refuse_slanted
 from sagline.robot.drum import drum_lever, drum_tension
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
-from sagline.robot.pose import Pose
 from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -241,9 +239,7 @@ def _length_slopes(state: Equilibrium) -> Array:
     wrench = np.tile(state.wrench, (len(free), 1))
 
     def lengths(h: float) -> Array:
-        turned = (Rotation.from_rotvec(h * free[:, 3:]) * state.pose.rotation).as_quat()
-        pose = Pose.from_quaternion(state.pose.position + h * free[:, :3], turned)
-        return lengths_near(state, method, pose, wrench, reference)
+        return lengths_near(state, method, moved_pose(state.pose, h * free), wrench, reference)
 
     slopes = (lengths(STEP) - lengths(-STEP)).T / (2.0 * STEP)
     if np.isnan(slopes).any():
@@ -263,7 +259,16 @@ def _corners(normals: Array, offsets: Array) -> Array:
         step = "Widen the limits of tensions, torques or speeds; an upper limit is necessary."
         value = "unbounded" if found.status == 3 else "empty or without volume"
         raise InvalidValueError("set of motions", value, "a bounded set with a volume", step)
-    return np.asarray(HalfspaceIntersection(np.column_stack((normals, -offsets)), found.x[:-1]).intersections)
+    try:
+        return np.asarray(HalfspaceIntersection(np.column_stack((normals, -offsets)), found.x[:-1]).intersections)
+    except QhullError:
+        raise _thin_set() from None
+
+
+def _thin_set() -> InvalidValueError:
+    """Error of a set that is too thin for Qhull."""
+    step = "Widen the limits of tensions, torques or speeds."
+    return InvalidValueError("set of motions", "without volume", "a bounded set with a volume", step)
 
 
 def _motion_set(state: Equilibrium, corners: Array) -> MotionSet:
@@ -271,8 +276,7 @@ def _motion_set(state: Equilibrium, corners: Array) -> MotionSet:
     try:
         hull = ConvexHull(corners)
     except QhullError:
-        step = "Widen the limits of tensions, torques or speeds."
-        raise InvalidValueError("set of motions", "without volume", "a bounded set with a volume", step) from None
+        raise _thin_set() from None
     equations = np.unique(hull.equations.round(12), axis=0)
     free = state.one_robot.freedom
     return MotionSet(
