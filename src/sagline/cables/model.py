@@ -262,15 +262,10 @@ class CableState(Result):
         return batch_length(self.shape, "state of a single cable")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
-        """State of the cables that `index` selects along the first axis.
-
-        Args:
-            index: A number (negative numbers count from the end), a slice, or an array of numbers or booleans.
-
-        Raises:
-            NoBatchError: If the state has only a single cable; the error is also a TypeError.
-            NoSuchEntryError: If an entry does not exist; the error is also an IndexError.
-        """
+        """State of the cables that `index` selects along the first axis."""
+        # index: A number (negative numbers count from the end), a slice, or an array of numbers or booleans.
+        # Raises NoBatchError if the state has only a single cable; the error is also a TypeError.
+        # Raises NoSuchEntryError if an entry does not exist; the error is also an IndexError.
         part = part_of(index, self.shape, "state of a single cable")
         arrays: dict[str, Any] = {name: locked(getattr(self, name)[part, ...]) for name in _ARRAYS}
         return replace(self, cable=self.cable._part(part, self.shape), **arrays)

@@ -123,10 +123,9 @@ def _compiled(function: F, kind: str) -> F:
 
 
 def bound(function: Callable[..., object], *arguments: object, numbers: int = 0) -> Callable[..., object]:
-    """An entry that keeps its arguments for many calls. Each call takes a microsecond less than a call of the entry.
-
-    The contents of the arrays may change between calls. Each call supplies new values for the last `numbers` arguments.
-    """
+    """An entry that keeps its arguments for many calls. Each call takes a microsecond less than a call of the entry."""
+    # The contents of the arrays may change between calls. Each call supplies new values for the last `numbers`
+    # arguments.
     if isinstance(function, Entry):
         return function.bind(arguments, numbers)
     fixed = arguments[: len(arguments) - numbers]

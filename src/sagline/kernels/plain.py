@@ -23,10 +23,8 @@ ENTRY: Final = "entry"  # name of the decorator of kernels that Python calls
 
 
 def plain(function: F) -> F:
-    """`function` in plain Python, with the line numbers of its file. All functions called in it must also be plain.
-
-    `function` is in the subset that docs/contributing/c-kernels.md defines.
-    """
+    """`function` in plain Python, with the line numbers of its file. All functions called in it must also be plain."""
+    # `function` is in the subset that docs/contributing/c-kernels.md defines.
     assert isinstance(function, FunctionType)
     lines, first = inspect.getsourcelines(function)
     module = ast.parse(textwrap.dedent("".join(lines)))

@@ -119,12 +119,10 @@ def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
 
 @formula
 def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array, needed: Array) -> None:
-    """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
-
-    The needed wrench balances three loads. The first load is the platform's weight, which no other argument includes.
-    The second load is `wrench`, external plus inertial, about the center of mass. The third load are the sag forces T_z
-    - tau sin phi (m,) of the cables, which act at the platform ends.
-    """
+    """Fill the wrench (6,) that the chord tensions must supply: J tau = needed."""
+    # The needed wrench balances three loads. The first load is the platform's weight, which no other argument includes.
+    # The second load is `wrench`, external plus inertial, about the center of mass. The third load are the sag forces
+    # T_z - tau sin phi (m,) of the cables, which act at the platform ends.
     fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
     mx = -wrench[3]
     my = -wrench[4]
@@ -324,10 +322,8 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
 
 @glue
 def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Balance) -> None:
-    """Fill scale, offset and limits of the variable of the tension distribution.
-
-    The initial frame-end tension is its first-order value tau - wD/2 sin phi.
-    """
+    """Fill scale, offset and limits of the variable of the tension distribution."""
+    # The initial frame-end tension is its first-order value tau - wD/2 sin phi.
     for i in range(weight.size):
         scale = weight[i]
         offset = 0.0

@@ -110,11 +110,9 @@ OPTIONS: Final[dict[str, dict[str, Any]]] = {
 
 
 def compiled(function: F, kind: str) -> F:
-    """A kernel whose machine code is kept on disk. A division by zero gives inf or NaN, as in NumPy.
-
-    Kernels allocate no memory (`sagline.kernels.memory`). Reference counting (_nrt) is therefore off. With arrays in
-    NamedTuples, reference counting would take a quarter of the run time.
-    """
+    """A kernel whose machine code is kept on disk. A division by zero gives inf or NaN, as in NumPy."""
+    # Kernels allocate no memory (`sagline.kernels.memory`). Reference counting (_nrt) is therefore off. With arrays in
+    # NamedTuples, reference counting would take a quarter of the run time.
     every: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **OPTIONS[kind]}
     return kept(cast("F", numba.njit(**every)(function)), folder_of(function.__module__), announced=kind == "entry")
 
@@ -127,11 +125,9 @@ def kept(dispatcher: F, folder: Path, *, announced: bool = False) -> F:
 
 
 def machine_code(function: Callable[..., object], arguments: tuple[object, ...]) -> Callable[..., object]:
-    """Machine code of an entry for the types of `arguments`, compiled or read from disk.
-
-    A call does not check the types of the arguments, which saves a microsecond for a dozen arrays. All arguments of a
-    call must have exactly the types of `arguments`.
-    """
+    """Machine code of an entry for the types of `arguments`, compiled or read from disk."""
+    # A call does not check the types of the arguments, which saves a microsecond for a dozen arrays. All arguments of a
+    # call must have exactly the types of `arguments`.
     dispatcher: Any = function
     signature = tuple(cast("Any", numba.typeof)(argument) for argument in arguments)
     dispatcher.compile(signature)

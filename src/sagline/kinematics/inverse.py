@@ -247,10 +247,8 @@ def _check_plane(robot: Robot, pose: Pose, item: str) -> None:
 
 
 def _out_of_plane(robot: Robot, pose: Pose) -> Array:
-    """Signed distances (N,) [m] between the plane of the platform ends and the plane of the frame ends.
-
-    The distances are zero for a robot that is not planar, or whose frame ends or platform ends are not in one plane.
-    """
+    """Signed distances (N,) [m] between the plane of the platform ends and the plane of the frame ends."""
+    # The distances are zero for a robot that is not planar, or whose frame ends or platform ends are not in one plane.
     away = np.zeros(len(np.atleast_2d(pose.position)))
     if robot.plane_normal is None:
         return away

@@ -188,12 +188,9 @@ _DEFAULT: Final = (*"xyz", "level")  # defaults with three or four cables: the f
 
 
 def given_codes(robot: Robot, given: Sequence[Given] | None) -> Indices | None:
-    """Codes of the given values of an underconstrained platform, (m,); None if the robot has enough cables.
-
-    Raises:
-        InvalidValueError: If the number of names is not m, or m is 1. If a name is unknown or occurs twice. If names
-            are given for a robot with enough cables.
-    """
+    """Codes of the given values of an underconstrained platform, (m,); None if the robot has enough cables."""
+    # Raises InvalidValueError if the number of names is not m, or m is 1; if a name is unknown or occurs twice; if
+    # names are given for a robot with enough cables.
     m = robot.cable_count
     if not is_underconstrained(robot):
         if given is not None:

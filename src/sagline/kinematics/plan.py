@@ -304,10 +304,8 @@ class Plan(Result, Saved, Tabular):
 
 
 def _length_rate(plan: Plan, path: Path) -> Array:
-    """Rates of the unstrained lengths (N, m) along `path`; NaN where the plan has no solution.
-
-    The rates are accurate to 1e-8 of the largest rate, and have first order at the border of feasibility.
-    """
+    """Rates of the unstrained lengths (N, m) along `path`; NaN where the plan has no solution."""
+    # The rates are accurate to 1e-8 of the largest rate, and have first order at the border of feasibility.
     # Geometry and tensions both change: L(t) = L(pose(t), tau(t)). The tensions of most methods depend only on the
     # pose. They are computed again shortly before and after each sample. `Closest` depends on its previous tensions.
     # It is solved again one step and two steps after each sample, relative to the tensions at the sample. At a

@@ -114,11 +114,9 @@ def solve_slanted_axes(
 
 
 def _approach_limits(run: Callable[[Array, Indices, Array], _Pass], exits: Array, which: Indices) -> Indices:
-    """Move the exit points of the infeasible poses `which` to those at tensions close to the limits.
-
-    The limits are widened less and less. A pose stays infeasible if the last change of its exit points is smaller than
-    the widening of the limits that does not make it feasible. Returns the poses at which this remains unknown.
-    """
+    """Move the exit points of the infeasible poses `which` to those at tensions close to the limits."""
+    # The limits are widened less and less. A pose stays infeasible if the last change of its exit points is smaller
+    # than the widening of the limits that does not make it feasible. Returns the poses at which this remains unknown.
     wider, moved, unsure = np.full(len(which), WIDEST), np.zeros(len(which)), []
     for _ in range(PASSES):
         last = run(exits[which], which, wider)

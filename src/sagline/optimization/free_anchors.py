@@ -28,11 +28,9 @@ _ON_PLANE: Final = 1e-9  # tolerance of the distance from a plane or axis, relat
 def _symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
-    """Index of each leading anchor, and shifts (K, c, 3) of all anchors if the leading anchor shifts by one meter.
-
-    A leading anchor determines the shifts of other anchors by symmetry. The index of a single leading anchor is None.
-    Raises an error if an anchor could cross its mirror plane, or is on the axis of rotation.
-    """
+    """Index of each leading anchor, and shifts (K, c, 3) of all anchors if the leading anchor shifts by one meter."""
+    # A leading anchor determines the shifts of other anchors by symmetry. The index of a single leading anchor is None.
+    # Raises an error if an anchor could cross its mirror plane, or is on the axis of rotation.
     count = len(anchors)
     if symmetry is None:
         alone = np.eye(count)

@@ -44,11 +44,9 @@ BLOCK = 1 << 12  # number of poses per block, which takes about 0.1 s; Ctrl-C is
 def distribute(
     robot: Robot, model: CableModel, cables: Array, poses: Array, wrench: Array, *, stiffness: bool
 ) -> tuple[Array, Array, Array | None]:
-    """Largest tension [N], largest sag [m] and least stiffness [N/m] of N poses, each (N,), with `MinimumNorm`.
-
-    A value is NaN at a pose without feasible tensions. cables: one table (m, CABLE_COLUMNS) per pose. The stiffness,
-    which is computed only if requested, is the smallest stiffness against a force on the center of mass.
-    """
+    """Largest tension [N], largest sag [m] and least stiffness [N/m] of N poses, each (N,), with `MinimumNorm`."""
+    # A value is NaN at a pose without feasible tensions. cables: one table (m, CABLE_COLUMNS) per pose. The stiffness,
+    # which is computed only if requested, is the smallest stiffness against a force on the center of mass.
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
     count, m = cables.shape[:2]
@@ -96,11 +94,9 @@ ITERATIONS: Final = 14  # number of halvings of the step
 
 
 def _move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
-    """Anchor coordinates (R, q) with the largest margin for R pairs of cable table and pose row; margins (R,) [N].
-
-    The search for a local maximum begins at the best point of a sample, moves along one coordinate after another, and
-    halves the steps.
-    """
+    """Anchor coordinates (R, q) with the largest margin for R pairs of cable table and pose row; margins (R,) [N]."""
+    # The search for a local maximum begins at the best point of a sample, moves along one coordinate after another, and
+    # halves the steps.
     count, q = len(poses), len(inner.parts)
 
     def at(points: Array) -> Array:
@@ -161,12 +157,10 @@ class Rating:
             self._held = self._held_at(candidates.cables(candidates.start[None]))
 
     def __call__(self, values: Array) -> Array:
-        """Goal values (N, g) of candidates with the design variables `values` (N, d).
-
-        Goal values are NaN for a candidate with coincident cables, with a lower tension limit above an upper limit, or
-        with a frame anchor inside the platform. If a goal needs tensions, goal values are also NaN for a candidate that
-        is infeasible at a pose at which the initial robot is feasible.
-        """
+        """Goal values (N, g) of candidates with the design variables `values` (N, d)."""
+        # Goal values are NaN for a candidate with coincident cables, with a lower tension limit above an upper limit,
+        # or with a frame anchor inside the platform. If a goal needs tensions, goal values are also NaN for a candidate
+        # that is infeasible at a pose at which the initial robot is feasible.
         size = max(1, ROWS // (len(self.rows) * (1 if self._robust is None else self._robust.samples)))
         parts = [self._rated(values[first : first + size]) for first in range(0, len(values), size)]
         return np.concatenate(parts)

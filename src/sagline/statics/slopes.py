@@ -97,10 +97,8 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
 
 
 def on_platform(forces: Array, levers: Array) -> Array:
-    """Wrenches (..., 6, m) of forces at the platform ends about the center of mass.
-
-    forces: (..., m, 3) [N]; levers: vectors from the center of mass to the platform ends, (..., m, 3) [m].
-    """
+    """Wrenches (..., 6, m) of forces at the platform ends about the center of mass."""
+    # forces: (..., m, 3) [N]; levers: vectors from the center of mass to the platform ends, (..., m, 3) [m].
     return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
 
 

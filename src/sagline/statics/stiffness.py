@@ -198,10 +198,8 @@ def modes(state: Equilibrium) -> Modes:
 
 
 def smallest_stiffness(state: Equilibrium) -> Array:
-    """Smallest stiffness of the platform against its free motions [N/m], shape (...,); NaN without a solution.
-
-    The size of a rotation is its arc at the root mean square distance of the platform ends from the center of mass.
-    """
+    """Smallest stiffness of the platform against its free motions [N/m], shape (...,); NaN without a solution."""
+    # The size of a rotation is its arc at the root mean square distance of the platform ends from the center of mass.
     _check_state(state, _MODES_BYTES)
     slopes, freedom = cable_slopes(state), first_of(state.robot).freedom
     radius = np.sqrt((slopes.levers**2).sum(axis=-1).mean(axis=-1))[..., None]
@@ -215,11 +213,9 @@ def smallest_stiffness(state: Equilibrium) -> Array:
 
 
 def natural_frequency(squares: Array) -> Array:
-    """Frequencies [Hz] from squared angular frequencies `squares`, shape (..., n).
-
-    A motion without stiffness, such as the rotation about a single rope, gets 0 Hz, because its squared frequency is
-    only a rounding error. An unstable motion gets NaN.
-    """
+    """Frequencies [Hz] from squared angular frequencies `squares`, shape (..., n)."""
+    # A motion without stiffness, such as the rotation about a single rope, gets 0 Hz, because its squared frequency is
+    # only a rounding error. An unstable motion gets NaN.
     largest = np.abs(squares).max(axis=-1, keepdims=True, initial=0.0)
     known = np.where(squares > NEUTRAL * largest, squares, np.where(squares < -UNSTABLE * largest, np.nan, 0.0))
     return np.asarray(np.sqrt(known) / (2.0 * np.pi))
@@ -231,20 +227,16 @@ def _check_state(state: Equilibrium, cable_bytes: float) -> None:
 
 
 def compliance_of(freedom: Array, matrix: Array) -> Array:
-    """Compliances (N, 6, 6): inverses of stiffnesses for the free motions, zero for all other motions.
-
-    NaN for a matrix that is singular or contains NaN.
-    """
+    """Compliances (N, 6, 6): inverses of stiffnesses for the free motions, zero for all other motions."""
+    # NaN for a matrix that is singular or contains NaN.
     found = np.empty(matrix.shape)
     sensitivity.compliances_of(freedom, locked(np.ascontiguousarray(matrix)), memory_for(1), found)
     return found
 
 
 def least_stiffness(freedom: Array, matrix: Array) -> Array:
-    """Stiffness against a force on the center of mass, in the softest direction [N/m], (N,); 0 if unstable.
-
-    Arguments: `freedom`, free motions (n, 6); `matrix`, stiffnesses of the platform in world axes (N, 6, 6), or NaN.
-    """
+    """Stiffness against a force on the center of mass, in the softest direction [N/m], (N,); 0 if unstable."""
+    # Arguments: `freedom`, free motions (n, 6); `matrix`, stiffnesses of the platform in world axes (N, 6, 6), or NaN.
     found = np.empty(len(matrix))
     sensitivity.least_stiffnesses(freedom, locked(np.ascontiguousarray(matrix)), memory_for(1), found)
     return found

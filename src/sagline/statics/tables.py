@@ -58,10 +58,8 @@ def pose_rows(pose: Pose) -> Array:
 
 
 def robot_terms(robot: Robots, slanted: bool = False, anchors: Array | None = None) -> tuple[Array, Array, Array]:
-    """Arrays of one or several robots for kernels: matrix of free motions (n, 6), `body_table` and `cable_table`.
-
-    anchors: frame anchors of one robot at N poses, (N, m, 3) [m]; None for those of the robots.
-    """
+    """Arrays of one or several robots for kernels: matrix of free motions (n, 6), `body_table` and `cable_table`."""
+    # anchors: frame anchors of one robot at N poses, (N, m, 3) [m]; None for those of the robots.
     table = cable_table(robot, slanted)
     if anchors is not None:
         table = np.repeat(table, len(anchors), axis=0)

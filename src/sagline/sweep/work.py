@@ -210,12 +210,10 @@ TRUST: Final = 1e-8  # smallest gap of a valid proof, relative to the forces: te
 
 
 def _proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
-    """Decide requests that the tension distribution could not decide; complete the results of feasible requests.
-
-    The arguments are pose rows (P, POSE_COLUMNS), loads (W, 6), and the results `found` of P W requests: all loads at
-    the first pose, then all loads at the next pose, and so on. Returns (P W,) proved lower bounds of the change of
-    force [N] that makes a request feasible: 0 for a feasible request, NaN for a request without a result.
-    """
+    """Decide requests that the tension distribution could not decide; complete the results of feasible requests."""
+    # The arguments are pose rows (P, POSE_COLUMNS), loads (W, 6), and the results `found` of P W requests: all loads at
+    # the first pose, then all loads at the next pose, and so on. Returns (P W,) proved lower bounds of the change of
+    # force [N] that makes a request feasible: 0 for a feasible request, NaN for a request without a result.
     proof = np.full(found.pose_status.size, np.nan)
     proof[found.pose_status == codes.POSE_SOLVED] = 0.0
     waiting = np.isin(found.pose_status, UNDECIDED).reshape(len(poses), len(loads))

@@ -77,14 +77,12 @@ def boundary(
     cells: int | tuple[int, int, int] = 32,
     refine: bool | int = True,
 ) -> Boundary:
-    """Boundary, in a box [m], of the set in which `level`, a function of positions (N, 3) [m], is nonnegative.
-
-    `level` may have jumps and infinite values, but not NaN. The function is evaluated at the nodes of a grid. `cells`
-    is the number of cells along the longest side, or along each axis. The cells on the boundary are then halved
-    `refine` times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. The
-    vertices of the net are on the edges of the grid. The volume between net and boundary, and the error bound, are
-    computed from the distances of the triangles' centers to the boundary.
-    """
+    """Boundary, in a box [m], of the set in which `level`, a function of positions (N, 3) [m], is nonnegative."""
+    # `level` may have jumps and infinite values, but not NaN. The function is evaluated at the nodes of a grid. `cells`
+    # is the number of cells along the longest side, or along each axis. The cells on the boundary are then halved
+    # `refine` times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. The
+    # vertices of the net are on the edges of the grid. The volume between net and boundary, and the error bound, are
+    # computed from the distances of the triangles' centers to the boundary.
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):
         if not a < b:

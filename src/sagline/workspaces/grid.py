@@ -244,13 +244,11 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Share (V,) of each line that is inside, by regula falsi. The weight of an end that does not move is reduced.
-
-    `values` has two arguments, indices of lines and one position on each line, and returns the function of each line. A
-    bracket is bisected if an end value is infinite. A bracket is bisected several times if regula falsi is slower than
-    bisection, for example at jumps. `precision` is relative to the smaller end value. `narrow` is relative to the
-    length of the line. The weights follow Anderson & Björck 1973; the Illinois method would have weights of 1/2.
-    """
+    """Share (V,) of each line that is inside, by regula falsi. The weight of an end that does not move is reduced."""
+    # `values` has two arguments, indices of lines and one position on each line, and returns the function of each line.
+    # A bracket is bisected if an end value is infinite. A bracket is bisected several times if regula falsi is slower
+    # than bisection, for example at jumps. `precision` is relative to the smaller end value. `narrow` is relative to
+    # the length of the line. The weights follow Anderson & Björck 1973; the Illinois method would have weights of 1/2.
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()
     small = np.minimum(at_low, -at_high)

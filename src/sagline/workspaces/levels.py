@@ -304,10 +304,8 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of `positions`: the level, or a value from the feasible fraction if the loads are infeasible.
-
-    With the margin as merit, the search would end at singular poses, where all margins are small.
-    """
+    """Finite merit of `positions`: the level, or a value from the feasible fraction if the loads are infeasible."""
+    # With the margin as merit, the search would end at singular poses, where all margins are small.
     found = levels.details(positions)
     bare = levels.margins_of(NO_LOAD, positions, found.rotation)
     weight = levels.criteria[0].scale(levels.robot)

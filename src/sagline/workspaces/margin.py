@@ -72,10 +72,8 @@ class MarginRows:
         moment_arm: float | None = None,
         cables: Array | None = None,
     ) -> None:
-        """Prepare one robot or R robots. `moment_arm` [m]: as in `margin`.
-
-        If `cables` (R, m, CABLE_COLUMNS) is given, the R robots are copies of `robot` with these tables of cables.
-        """
+        """Prepare one robot or R robots. `moment_arm` [m]: as in `margin`."""
+        # If `cables` (R, m, CABLE_COLUMNS) is given, the R robots are copies of `robot` with these tables of cables.
         robots = together(robot)
         shared = first_of(robots)
         freedom, bodies, table = robot_terms(robots)

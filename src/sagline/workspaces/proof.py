@@ -143,14 +143,12 @@ def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
 
 
 def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
-    """Verdicts of cells of positions, for level poses or for all tilts up to `tilt`.
-
-    Tilts are rotation vectors in a ball. Cubes cover the ball. For a planar robot, tilts are rotations about the normal
-    of its plane, and intervals cover their range. The angle between two rotations of a cube is at most the length of
-    the difference of their rotation vectors. A cell is outside if one orientation is infeasible, and inside if all
-    orientations are feasible. Within a cell, the directions of the cables vary by an angle of about the cell's size
-    divided by the length of a chord. Cubes are divided until they are smaller than the angle of this variation.
-    """
+    """Verdicts of cells of positions, for level poses or for all tilts up to `tilt`."""
+    # Tilts are rotation vectors in a ball. Cubes cover the ball. For a planar robot, tilts are rotations about the
+    # normal of its plane, and intervals cover their range. The angle between two rotations of a cube is at most the
+    # length of the difference of their rotation vectors. A cell is outside if one orientation is infeasible, and inside
+    # if all orientations are feasible. Within a cell, the directions of the cables vary by an angle of about the cell's
+    # size divided by the length of a chord. Cubes are divided until they are smaller than the angle of this variation.
     if tilt == 0.0:
         return prover.verdicts(middle, half)
     verdict = np.full(len(middle), ProofVerdict.PROVED_INSIDE, dtype=np.int8)

@@ -31,11 +31,9 @@ Exclude = Callable[[Array, Array], Flags]
 
 
 def separated(components: Components, exclude: Exclude | None) -> Flags:
-    """Mask (K,): True for a component that a closed layer of excluded boxes separates from all other components.
-
-    A search starts at each component and continues outward until it meets excluded cells. The component is separated if
-    the search ends before it reaches another component. If not, the search is repeated with smaller cells.
-    """
+    """Mask (K,): True for a component that a closed layer of excluded boxes separates from all other components."""
+    # A search starts at each component and continues outward until it meets excluded cells. The component is separated
+    # if the search ends before it reaches another component. If not, the search is repeated with smaller cells.
     found = np.zeros(components.count, dtype=np.bool_)
     if exclude is not None:
         search = _Search(components, exclude)

@@ -39,10 +39,8 @@ def copy(source: Array, target: Array) -> None:
 
 @kernel
 def factor_positive(matrix: Array, shift: float, factor: Array) -> bool:
-    """Fill the Cholesky factor L, lower triangle, of `matrix` (n, n) + `shift` * 1. False if not positive definite.
-
-    Only the lower triangle of `matrix` is used. `factor` may be the same array as `matrix`.
-    """
+    """Fill the Cholesky factor L, lower triangle, of `matrix` (n, n) + `shift` * 1. False if not positive definite."""
+    # Only the lower triangle of `matrix` is used. `factor` may be the same array as `matrix`.
     n = matrix.shape[0]
     for j in range(n):
         diagonal = matrix[j, j] + shift
@@ -158,11 +156,9 @@ def invert_general(matrix: Array, inverse: Array) -> float:
 
 @formula
 def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
-    """Make row `count` of a frame (.., d) orthogonal to the rows before it, which are orthonormal.
-
-    Column `count` of the triangle is filled, above the diagonal, with the subtracted components. Returns the squared
-    length of the new row.
-    """
+    """Make row `count` of a frame (.., d) orthogonal to the rows before it, which are orthonormal."""
+    # Column `count` of the triangle is filled, above the diagonal, with the subtracted components. Returns the squared
+    # length of the new row.
     d = frame.shape[1]
     for b in range(count):
         triangle[b, count] = 0.0
@@ -230,11 +226,9 @@ def reflect_rows(reduced: Array, diagonals: Array) -> None:
 
 @formula
 def factorize(reduced: Array, diagonals: Array) -> bool:
-    """QR factorization in place; returns True if the matrix (n, m) has full rank.
-
-    On return, row k of reduced contains the part of column k of R above the diagonal, then the vector v of reflection
-    k. In diagonals (2, n), row HEADS is the diagonal of R, and row FACTORS contains 2/|v|^2 of the reflections.
-    """
+    """QR factorization in place; returns True if the matrix (n, m) has full rank."""
+    # On return, row k of reduced contains the part of column k of R above the diagonal, then the vector v of reflection
+    # k. In diagonals (2, n), row HEADS is the diagonal of R, and row FACTORS contains 2/|v|^2 of the reflections.
     n, m = reduced.shape
     for k in range(n):
         before = 0.0
@@ -347,11 +341,9 @@ def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
-    """Smallest eigenvalue of the tridiagonal matrix `sign` * T, by Laguerre's iteration from below.
-
-    The product of the pivots q of the shifted matrix is the characteristic polynomial. All pivots are positive below
-    the smallest root, which the iteration never passes.
-    """
+    """Smallest eigenvalue of the tridiagonal matrix `sign` * T, by Laguerre's iteration from below."""
+    # The product of the pivots q of the shifted matrix is the characteristic polynomial. All pivots are positive below
+    # the smallest root, which the iteration never passes.
     n = diagonal.shape[0]
     root = _gershgorin_bound(diagonal, beside, sign)
     size = max(abs(root), abs(_gershgorin_bound(diagonal, beside, -sign)))
@@ -377,11 +369,9 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
-    """Smallest and largest eigenvalue of a symmetric matrix (n, n). All arrays are overwritten.
-
-    If |smallest| exceeds `flat` times an upper bound of the largest eigenvalue, this bound is returned instead of the
-    largest eigenvalue, which saves time. The bound is at most three times the largest eigenvalue.
-    """
+    """Smallest and largest eigenvalue of a symmetric matrix (n, n). All arrays are overwritten."""
+    # If |smallest| exceeds `flat` times an upper bound of the largest eigenvalue, this bound is returned instead of the
+    # largest eigenvalue, which saves time. The bound is at most three times the largest eigenvalue.
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)
     bound = -_gershgorin_bound(diagonal, beside, -1.0)

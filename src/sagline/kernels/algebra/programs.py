@@ -33,10 +33,9 @@ PIVOT = 1e-11  # smallest pivot, relative to the largest entry of the row
 
 
 class Basis(NamedTuple):
-    """The active sides of an optimal point, from which the next program with equal rows and cost can start.
+    """The active sides of an optimal point, from which the next program with equal rows and cost can start."""
 
-    A finite limit must stay finite in the next program, because a side at infinity cannot be active.
-    """
+    # A finite limit must stay finite in the next program, because a side at infinity cannot be active.
 
     # labels of the active sides, (d + 1,). If the bounds have no common point, the last entry is the side that
     # contradicts the others. labels[0] is -1 if there is no basis. Labels from 2k on are sides of a box that replaces
@@ -124,10 +123,8 @@ def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basi
 
 @kernel
 def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
-    """Fill `point` (d,) with the point of least cost . x within all bounds. Returns the outcome.
-
-    `slack`: allowed violation of a bound; 0 for the usual tolerance. At the box that replaces infinity: unbounded.
-    """
+    """Fill `point` (d,) with the point of least cost . x within all bounds. Returns the outcome."""
+    # `slack`: allowed violation of a bound; 0 for the usual tolerance. At the box that replaces infinity: unbounded.
     labels, weights, inverse = basis
     d = cost.size
     largest = largest_bound(bounds)

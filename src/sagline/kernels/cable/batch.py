@@ -36,14 +36,11 @@ def _copy_chunk(source: Array, start: int, stop: int, target: Array) -> None:
 
 @entry
 def batch_from_tension(terms: Terms, cables: Operands, found: tuple[Array, Array, Array, Codes], buffer: Array) -> None:
-    """Length, forces on the platform end and status of every cable at its chord tension.
-
-    Loops without branches solve all cables of a chunk as ordinary catenaries. The cables that are not ordinary are then
-    solved again, one by one. Each loop has one result, because the compiler vectorizes only such loops.
-
-    `cables`: span, rise, density, axial stiffness and chord tension. `found`: filled with length, T_x, T_z and status.
-    `buffer`: work array, (BUFFERS, CHUNK).
-    """
+    """Length, forces on the platform end and status of every cable at its chord tension."""
+    # Loops without branches solve all cables of a chunk as ordinary catenaries. The cables that are not ordinary are
+    # then solved again, one by one. Each loop has one result, because the compiler vectorizes only such loops.
+    # `cables`: span, rise, density, axial stiffness and chord tension. `found`: filled with length, T_x, T_z and
+    # status. `buffer`: work array, (BUFFERS, CHUNK).
     model = model_of(terms)
     span, rise, density, stiffness, tension = cables
     length_out, horizontal_out, vertical_out, status_out = found
@@ -217,14 +214,12 @@ def closures(terms: Terms, cables: States, residual_out: Array) -> None:
 def creep_strains(
     time: Array, tension: Array, stiffness: Array, delay: Array, settled: Flags, strain_out: Array
 ) -> None:
-    """Creep strain: sum of the strains of elements (spring parallel to damper). Exact for piecewise linear tensions.
-
-    Samples whose tension is NaN are omitted. Between the neighbors of an omitted sample, the tension is linear in time.
-
-    `time`: increasing [s], (N,). `tension`: (N, m) [N]. `stiffness`, `delay`: stiffness [N] and delay time [s] of each
-    element. `settled`: True if the first tension has acted for a long time, (1,); if False, the initial strain is zero.
-    `strain_out`: filled, (N, m).
-    """
+    """Creep strain: sum of the strains of elements (spring parallel to damper). Exact for piecewise linear tensions."""
+    # Samples whose tension is NaN are omitted. Between the neighbors of an omitted sample, the tension is linear in
+    # time.
+    # `time`: increasing [s], (N,). `tension`: (N, m) [N]. `stiffness`, `delay`: stiffness [N] and delay time [s] of
+    # each element. `settled`: True if the first tension has acted for a long time, (1,); if False, the initial strain
+    # is zero. `strain_out`: filled, (N, m).
     for i in range(tension.shape[1]):
         for p in range(tension.shape[0]):
             strain_out[p, i] = 0.0 if abs(tension[p, i]) < math.inf else math.nan
@@ -249,15 +244,12 @@ def creep_strains(
 def cable_courses(
     cables: Array, body: Array, pose: Array, tension: Array, wraps: int, rotation: Array, geometry: Array, points: Array
 ) -> None:
-    """Points of exact cables from their frame anchors over their pulleys to their platform ends.
-
-    A cable without a tension is drawn along its chord. If the platform end is too near
-    to the pulley for a chord, a straight line between the anchors is drawn.
-
-    `tension`: chord tensions [N], (m,); NaN for a cable without a tension. `wraps`: number of points on each pulley, 0
-    or at least 2. Without a pulley, all are at the frame anchor. `rotation`, `geometry`: work arrays, (3, 3) and
-    (GEOMETRY_ROWS, m). `points`: filled with the points in world axes [m], (m, points, 3).
-    """
+    """Points of exact cables from their frame anchors over their pulleys to their platform ends."""
+    # A cable without a tension is drawn along its chord. If the platform end is too near to the pulley for a chord, a
+    # straight line between the anchors is drawn.
+    # `tension`: chord tensions [N], (m,); NaN for a cable without a tension. `wraps`: number of points on each pulley,
+    # 0 or at least 2. Without a pulley, all are at the frame anchor. `rotation`, `geometry`: work arrays, (3, 3) and
+    # (GEOMETRY_ROWS, m). `points`: filled with the points in world axes [m], (m, points, 3).
     gravity = body[tables.GRAVITY]
     model = Model(codes.CATENARY, 0.0, 0.0, gravity, None)
     cable_geometry(cables, body, pose, rotation, geometry)

@@ -55,13 +55,11 @@ def _wound_length(drum: Array, layer: int, turns: float) -> float:
 
 @entry
 def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Array, travel_out: Array) -> None:
-    """Fill the number of turns on each drum, and the change of length per turn [m], for each `length` off the drum.
-
-    The number of turns is negative if `length` exceeds the whole cable, and exceeds the capacity beyond the last layer.
-
-    `drums`: table, (m, DRUM_COLUMNS). `starts`: length off the drum at which each layer begins, in decreasing order,
-    (m, layers + 1). `length`: lengths at the winding tension [m], (N, m). `turns_out`, `travel_out`: filled, (N, m).
-    """
+    """Fill the number of turns on each drum, and the change of length per turn [m], for each `length` off the drum."""
+    # The number of turns is negative if `length` exceeds the whole cable, and exceeds the capacity beyond the last
+    # layer.
+    # `drums`: table, (m, DRUM_COLUMNS). `starts`: length off the drum at which each layer begins, in decreasing order,
+    # (m, layers + 1). `length`: lengths at the winding tension [m], (N, m). `turns_out`, `travel_out`: filled, (N, m).
     for p in range(length.shape[0]):
         for i in range(length.shape[1]):
             drum = drums[i]
@@ -104,15 +102,13 @@ def lengths_of_turns(drums: Array, starts: Array, turns: Array, length_out: Arra
 def follow_memory(
     given: Array, strain: Array, rest_strain: Array, unstrained: bool, found_out: Array, memory: Array
 ) -> None:
-    """Conversion between unstrained lengths off the drum and lengths along the path of winding.
-
-    On the drum the cable keeps the strain with which it was wound. The strain at the drum is linear in length between
-    two samples. Cable that never left the drum has the initial strain. Samples with NaN are omitted.
-
-    `given`: lengths off the drum [m], (N, m): unstrained if `unstrained` is true, else along the path of winding.
-    `strain`: strain of the cable at the drum for each sample, (N, m). `rest_strain`: initial strain of the cable on the
-    drum, (m,). `found_out`: filled with the converted lengths [m], (N, m). `memory`: work array, (MEMORY_ROWS, N).
-    """
+    """Conversion between unstrained lengths off the drum and lengths along the path of winding."""
+    # On the drum the cable keeps the strain with which it was wound. The strain at the drum is linear in length between
+    # two samples. Cable that never left the drum has the initial strain. Samples with NaN are omitted.
+    # `given`: lengths off the drum [m], (N, m): unstrained if `unstrained` is true, else along the path of winding.
+    # `strain`: strain of the cable at the drum for each sample, (N, m). `rest_strain`: initial strain of the cable on
+    # the drum, (m,). `found_out`: filled with the converted lengths [m], (N, m). `memory`: work array, (MEMORY_ROWS,
+    # N).
     for i in range(given.shape[1]):
         depth, begun = 0, False
         length = path = last = base_length = base_path = 0.0

@@ -217,11 +217,9 @@ def behind_at(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, 
 
 @formula
 def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
-    """Motion of the platform end per meter of cable at a fixed force (x, z), and equivalent length per newton of H.
-
-    An increase of H stretches the part between P and the drum. The platform end then moves as if cable were paid out.
-    The third value is the length of paid-out cable with this effect, per newton of H.
-    """
+    """Motion of the platform end per meter of cable at a fixed force (x, z), and equivalent length per newton of H."""
+    # An increase of H stretches the part between P and the drum. The platform end then moves as if cable were paid out.
+    # The third value is the length of paid-out cable with this effect, per newton of H.
     material, pulley = material_at(cables, i), pulley_at(cables, i)
     wrap, tension = _wrap_at(rows, i), rows[g.LEAVING, i]
     weight = _weight_per_length(model, material)
@@ -312,10 +310,8 @@ def _has_converged(rows: Array, i: int) -> bool:
 
 @formula
 def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
-    """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
-
-    `behind` is `Model.behind` as a separate argument. If `behind` is None, the code for pulleys is not compiled.
-    """
+    """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length."""
+    # `behind` is `Model.behind` as a separate argument. If `behind` is None, the code for pulleys is not compiled.
     if behind is None:
         bare = (rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])
         _solve_equivalent_cables(model, cables, bare, rows)

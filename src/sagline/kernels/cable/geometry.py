@@ -35,13 +35,11 @@ def _rotation_matrix(pose: Array, rotation: Array) -> None:
 
 @formula
 def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[float, float, float]:
-    """Length, sin phi and cos phi of the tangent from a pulley to a point. NaN if no tangent exists.
-
-    The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
-    pulley. `entry` is +1 for a cable that enters from below. A point inside the pulley or on its near side has no
-    tangent. After half a turn on the pulley, the cable is vertical, and exit and entry are two radii apart. The point
-    is then exactly below the exit, or above the exit if the cable enters from above.
-    """
+    """Length, sin phi and cos phi of the tangent from a pulley to a point. NaN if no tangent exists."""
+    # The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
+    # pulley. `entry` is +1 for a cable that enters from below. A point inside the pulley or on its near side has no
+    # tangent. After half a turn on the pulley, the cable is vertical, and exit and entry are two radii apart. The point
+    # is then exactly below the exit, or above the exit if the cable enters from above.
     across = span - radius
     along = entry * rise
     square = across * across + along * along
@@ -72,10 +70,8 @@ def _tangent_about(cables: Array, i: int, x: float, y: float, z: float) -> tuple
 
 @formula
 def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geometry: Array) -> None:
-    """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose. A vertical cable gets azimuth 0.
-
-    The chord of a cable over a pulley is the tangent from its platform end to the pulley. NaN if no tangent exists.
-    """
+    """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose. A vertical cable gets azimuth 0."""
+    # The chord of a cable over a pulley is the tangent from its platform end to the pulley. NaN if no tangent exists.
     _rotation_matrix(pose, rotation)
     for i in range(cables.shape[0]):
         bx = cables[i, tables.PLATFORM_X]

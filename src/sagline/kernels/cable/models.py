@@ -327,12 +327,10 @@ def shallow_length_ratio(
 def _shallow_tension(
     chord: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float, length: float
 ) -> tuple[float, bool]:
-    """Chord tension of a shallow cable of the length `length`, and True if this tension was found.
-
-    The first Newton steps solve the cubic equation of the parabolic model, from above its root. The later steps use the
-    length of the cable's own model and stay within two bounds. A cable without sag that is longer than its chord has no
-    tension.
-    """
+    """Chord tension of a shallow cable of the length `length`, and True if this tension was found."""
+    # The first Newton steps solve the cubic equation of the parabolic model, from above its root. The later steps use
+    # the length of the cable's own model and stay within two bounds. A cable without sag that is longer than its chord
+    # has no tension.
     p = (length - chord) / length * stiffness
     q = stiffness * chord * sag / length
     tension = max(-p, 0.0) + np.cbrt(q)

@@ -67,13 +67,11 @@ def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
 def exit_after(
     pulley: Pulley, weight: float, stiffness: float, force: tuple[float, float], before: tuple[float, float]
 ) -> tuple[float, float]:
-    """Sine and cosine of the wrap angle after one Newton step.
-
-    If the wrap angle grows by d, the free span becomes shorter by R d/E_A, and T_zA grows by the weight of this length.
-    Large steps are halved, because the exit point of a slack cable could otherwise move back and forth without end.
-
-    force: T_x and T_zA of the cable at the wrap angle before the step.
-    """
+    """Sine and cosine of the wrap angle after one Newton step."""
+    # If the wrap angle grows by d, the free span becomes shorter by R d/E_A, and T_zA grows by the weight of this
+    # length. Large steps are halved, because the exit point of a slack cable could otherwise move back and forth
+    # without end.
+    # force: T_x and T_zA of the cable at the wrap angle before the step.
     horizontal, vertical_a = force
     tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
     if tension == 0.0 or horizontal < 0.0:  # a weightless cable without tension, or with a rounding error of it
@@ -166,11 +164,9 @@ def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: floa
 def _length_behind_by(
     pulley: Pulley, weight: float, stiffness: float, force: Force, free: float, change: Change, grown: float
 ) -> tuple[float, float]:
-    """Changes of psi and of the unstrained length between P and drum, at a fixed force on the platform end.
-
-    `weight`: weight per length [N/m]. `stiffness`: EA [N]. `free`: unstrained length of the free span [m]. `change`:
-    changes of the parameters (the length has no effect here). `grown`: increase of the free span's unstrained length.
-    """
+    """Changes of psi and of the unstrained length between P and drum, at a fixed force on the platform end."""
+    # `weight`: weight per length [N/m]. `stiffness`: EA [N]. `free`: unstrained length of the free span [m]. `change`:
+    # changes of the parameters (the length has no effect here). `grown`: increase of the free span's unstrained length.
     radius, entry, dead, rise = pulley
     _length, weight_by, stiffness_by, radius_by, dead_change = change
     vertical_a = force.vertical - weight * free

@@ -209,10 +209,8 @@ def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, floa
 
 @kernel
 def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> float:
-    """Chord tension between `low` and `high` at which the sag force rises; it falls at both. NaN if it never rises.
-
-    The growth of the sag force has one peak. Golden-section search finds it.
-    """
+    """Chord tension between `low` and `high` at which the sag force rises; it falls at both. NaN if it never rises."""
+    # The growth of the sag force has one peak. Golden-section search finds it.
     a, b = math.log(low), math.log(high)
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
     at_c, at_d = _growth_of(curves, i, math.exp(c)), _growth_of(curves, i, math.exp(d))

@@ -50,12 +50,10 @@ TAUT = 1.25  # chord tension in units of wD/2 that is larger than the chord tens
 
 @glue
 def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
-    """Fill the free spans and their tensions. The exit points follow from the forces at the pulleys.
-
-    The forces are computed from the chord tensions and from the last lengths and sag forces. If `fresh` is true, no
-    lengths and sag forces exist yet, and first-order values are used. Cables of the shallow models leave the pulley
-    along their chord. Returns the largest change of an exit direction.
-    """
+    """Fill the free spans and their tensions. The exit points follow from the forces at the pulleys."""
+    # The forces are computed from the chord tensions and from the last lengths and sag forces. If `fresh` is true, no
+    # lengths and sag forces exist yet, and first-order values are used. Cables of the shallow models leave the pulley
+    # along their chord. Returns the largest change of an exit direction.
     exact = model.code == codes.CATENARY
     change = 0.0
     for i in range(cables.tau.size):
@@ -89,15 +87,12 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
 
 @glue
 def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> tuple[int, float]:
-    """Fill slackness, strain, ratio and sag force of all cables, and the statuses (m,), at their chord tensions.
-
-    Loops without branches, which vectorize, solve ordinary catenaries. The cables that are not ordinary are then solved
-    one by one. The exit points follow from the previous lengths and sag forces.
-
-    `fresh`: True if lengths and sag forces do not exist yet. `near`: True if the tensions have changed by less than
-    NEAR since the last ratios. `statuses`: filled. Returns the most serious status, and the largest change of the
-    direction in which a cable leaves its pulley.
-    """
+    """Fill slackness, strain, ratio and sag force of all cables, and the statuses (m,), at their chord tensions."""
+    # Loops without branches, which vectorize, solve ordinary catenaries. The cables that are not ordinary are then
+    # solved one by one. The exit points follow from the previous lengths and sag forces.
+    # `fresh`: True if lengths and sag forces do not exist yet. `near`: True if the tensions have changed by less than
+    # NEAR since the last ratios. `statuses`: filled. Returns the most serious status, and the largest change of the
+    # direction in which a cable leaves its pulley.
     m = cables.tau.size
     change = _fill_exit_points(model, cables, fresh) if cables.machine else 0.0
     near = near and change < NEAR
@@ -173,11 +168,9 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 
 @kernel
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
-    """Chord tension at which the tension at the frame end is `tension`, on the taut side.
-
-    If every frame-end tension is larger, the result is the chord tension at which a parabola has its least frame-end
-    tension.
-    """
+    """Chord tension at which the tension at the frame end is `tension`, on the taut side."""
+    # If every frame-end tension is larger, the result is the chord tension at which a parabola has its least frame-end
+    # tension.
     loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
     return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
 
@@ -186,14 +179,11 @@ def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, p
 def taut_at_frame_end(
     model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, otherwise: float
 ) -> float:
-    """Chord tension at which the tension at the frame end is `tension`, on the taut side.
-
-    The frame-end tension of a sagging cable has a least value, at most 3/4 wD cos(phi). The frame-end tension is a
-    convex function of the chord tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore
-    descend to the root, or to the least frame-end tension.
-
-    `tension`: frame-end tension [N]. `otherwise`: value to return if every frame-end tension is larger.
-    """
+    """Chord tension at which the tension at the frame end is `tension`, on the taut side."""
+    # The frame-end tension of a sagging cable has a least value, at most 3/4 wD cos(phi). The frame-end tension is a
+    # convex function of the chord tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore
+    # descend to the root, or to the least frame-end tension.
+    # `tension`: frame-end tension [N]. `otherwise`: value to return if every frame-end tension is larger.
     weight = material.density * model.gravity
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:
         return tension
@@ -246,12 +236,11 @@ def lengths_at_frame_ends(
     rotation: Array,
     geometry: Array,
 ) -> None:
-    """Unstrained lengths off the drums [m] of cables at a pose; each cable is computed separately.
-
-    `tension`: tensions at the frame ends [N], (m,). `tension_out`: filled with the frame-end tensions at the found
-    lengths [N], (m,). If a given tension is below the least possible tension, the result differs from it. `length_out`:
-    filled with the lengths [m], (m,). `rotation`, `geometry`: work arrays, (3, 3) and (GEOMETRY_ROWS, m).
-    """
+    """Unstrained lengths off the drums [m] of cables at a pose; each cable is computed separately."""
+    # `tension`: tensions at the frame ends [N], (m,). `tension_out`: filled with the frame-end tensions at the found
+    # lengths [N], (m,). If a given tension is below the least possible tension, the result differs from it.
+    # `length_out`: filled with the lengths [m], (m,). `rotation`, `geometry`: work arrays, (3, 3) and (GEOMETRY_ROWS,
+    # m).
     model = model_of(terms)
     cable_geometry(cables, body, pose, rotation, geometry)
     for i in range(tension.size):
@@ -305,10 +294,8 @@ def is_limited_by_strain(cables: Cables, i: int) -> bool:
 
 @glue
 def cable_without_tension(cables: Cables) -> int:
-    """Index of the first cable without admissible tensions; -1 if all cables have admissible tensions.
-
-    With the article's bound (54), a horizontal cable has no admissible tension.
-    """
+    """Index of the first cable without admissible tensions; -1 if all cables have admissible tensions."""
+    # With the article's bound (54), a horizontal cable has no admissible tension.
     for i in range(cables.low.size):
         if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
             return i
@@ -335,10 +322,8 @@ def _slackness_beside_axis(chord: Chord, pulley: Pulley) -> float:
 def fill_admissible_tensions(
     model: Model, limits: TensionLimits, low: float, high: float, cables: Cables, i: int
 ) -> None:
-    """Fill the smallest and largest admissible chord tension of cable `i`; smallest > largest if none is admissible.
-
-    `low`, `high`: limits of the robot [N]; the upper limit may be infinite.
-    """
+    """Fill the smallest and largest admissible chord tension of cable `i`; smallest > largest if none is admissible."""
+    # `low`, `high`: limits of the robot [N]; the upper limit may be infinite.
     half_weight = cables.half_weight[i]
     # the free span of a slack cable over a pulley can be longer than the tangent by one diameter
     floor = least_of_sag(model, half_weight + cables.density[i] * model.gravity * cables.radius[i])
@@ -361,10 +346,8 @@ def fill_admissible_tensions(
 def _limits_at_chord(
     model: Model, chord: Chord, material: Material, pulley: Pulley, low: float, high: float, floor: float
 ) -> tuple[float, float]:
-    """Convert limits of the frame-end tension to limits of the chord tension [N].
-
-    Returns infinity and zero if the frame-end tension is above its upper limit at every chord tension.
-    """
+    """Convert limits of the frame-end tension to limits of the chord tension [N]."""
+    # Returns infinity and zero if the frame-end tension is above its upper limit at every chord tension.
     largest = taut_at_frame_end(model, chord, material, pulley, high, -1.0)
     if largest < 0.0:
         return math.inf, 0.0
@@ -378,12 +361,9 @@ def _limits_at_chord(
 def _slackest_at_frame_end(
     model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, floor: float, taut: float
 ) -> float:
-    """Smallest chord tension [N] of the range in which the frame-end tension is at most `tension`.
-
-    A golden-section search finds a chord tension inside the range. A second search finds the range's lower end.
-
-    `floor`: lower bound of the result [N]. `taut`: largest chord tension of the range, on the rising side [N].
-    """
+    """Smallest chord tension [N] of the range in which the frame-end tension is at most `tension`."""
+    # A golden-section search finds a chord tension inside the range. A second search finds the range's lower end.
+    # `floor`: lower bound of the result [N]. `taut`: largest chord tension of the range, on the rising side [N].
     if tension == math.inf or frame_end_tension(model, chord, material, pulley, floor) <= tension:
         return min(floor, taut)
     low, high = math.log(floor), math.log(taut)

@@ -44,11 +44,9 @@ def _series_excess(
 def catenary_stiffness(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> PlaneStiffness:
-    """In-plane stiffness of the exact cable: the inverse of dB/dT, in a form without cancellation.
-
-    Let p, q and c be the coefficients of length/(T_A + T_B) in dx/dT_x, dz/dT_z and -dx/dT_z. Then p + q = 2 and p q =
-    c^2 hold exactly, so that the determinant is a sum of positive terms.
-    """
+    """In-plane stiffness of the exact cable: the inverse of dB/dT, in a form without cancellation."""
+    # Let p, q and c be the coefficients of length/(T_A + T_B) in dx/dT_x, dz/dT_z and -dx/dT_z. Then p + q = 2 and p q
+    # = c^2 hold exactly, so that the determinant is a sum of positive terms.
     vertical_a = vertical - weight * length
     square = horizontal * horizontal
     tension_a = math.sqrt(square + vertical_a * vertical_a)
@@ -97,11 +95,9 @@ def _elastic_stiffness(span: float, rise: float, length: float, tension: float, 
 def _shallow_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> tuple[float, float, float, float, float]:
-    """Derivatives of tau of a shallow cable with respect to x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1].
-
-    The derivatives follow from L (1 + s/EA) = D (1 + S/tau^2) with S = k (rho x_B)^2 and s = |T| (empirical) or tau
-    (parabolic).
-    """
+    """Derivatives of tau of a shallow cable with respect to x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
+    # The derivatives follow from L (1 + s/EA) = D (1 + S/tau^2) with S = k (rho x_B)^2 and s = |T| (empirical) or tau
+    # (parabolic).
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
     sine = rise / chord
@@ -171,10 +167,8 @@ def _free_span_at(rows: Array, i: int, behind: bool | None) -> tuple[float, floa
 
 @formula
 def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
-    """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`.
-
-    With swivel axes of any direction, the stiffness is filled in world axes.
-    """
+    """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`."""
+    # With swivel axes of any direction, the stiffness is filled in world axes.
     for i in range(cables.shape[0]):
         if behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
             stiffness_of_swivel(model, cables, rows, i)
@@ -231,10 +225,8 @@ def _cable_energy(model: Model, span: float, rise: float, material: Material, le
 
 @formula
 def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | None) -> tuple[float, float]:
-    """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
-
-    `behind` is `Model.behind` as a separate argument. If `behind` is None, the code for pulleys is not compiled.
-    """
+    """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms."""
+    # `behind` is `Model.behind` as a separate argument. If `behind` is None, the code for pulleys is not compiled.
     energy = 0.0
     size = 0.0
     for i in range(cables.shape[0]):
@@ -358,10 +350,8 @@ def force_slopes(
 def slopes_over(
     model: Model, material: Material, pulley: Pulley, free: float, force: Force, plane: PlaneStiffness
 ) -> _ForceSlopes:
-    """Derivatives of the force of a cable over a pulley, for shallow and exact cables.
-
-    `free`: unstrained length of the free span [m].
-    """
+    """Derivatives of the force of a cable over a pulley, for shallow and exact cables."""
+    # `free`: unstrained length of the free span [m].
     weight = 0.0 if model.code == codes.ELASTIC else material.density * model.gravity
     by_weight = none = PlaneVector(0.0, 0.0)
     if weight > 0.0:

@@ -119,11 +119,10 @@ def _strains(swivel: Swivel, tension: float, zeta: float) -> tuple[float, float,
 
 @formula
 def _exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
-    """Exit point of a cable whose force at the exit point is (`x`, `y`, `z`), toward the platform end [N].
-
-    Without weight on the pulley, e_r is in the plane of force and axis. The weight turns it by the angle whose tangent
-    is -k e_s.z/(v F.e_r - k e_r.z), with e_r and e_s of this plane. The wrap angle changes by the square of this angle.
-    """
+    """Exit point of a cable whose force at the exit point is (`x`, `y`, `z`), toward the platform end [N]."""
+    # Without weight on the pulley, e_r is in the plane of force and axis. The weight turns it by the angle whose
+    # tangent is -k e_s.z/(v F.e_r - k e_r.z), with e_r and e_s of this plane. The wrap angle changes by the square of
+    # this angle.
     nx, ny, nz = swivel.x, swivel.y, swivel.z
     radius = swivel.radius
     along = x * nx + y * ny + z * nz
@@ -214,11 +213,9 @@ def _inverse_of_symmetric(
 
 @kernel
 def _fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
-    """Fill stiffness K [N/m] and dT/dL = -K dB/dL [N/m] of cable `i`. `end`: force at the platform end [N].
-
-    The compliance follows from three equations for psi, the swivel angle and the free length: F.e_rho = 0, v F.e_s - k
-    e_s.z = 0, and the sum of all lengths. F is the force at the exit point.
-    """
+    """Fill stiffness K [N/m] and dT/dL = -K dB/dL [N/m] of cable `i`. `end`: force at the platform end [N]."""
+    # The compliance follows from three equations for psi, the swivel angle and the free length: F.e_rho = 0, v F.e_s -
+    # k e_s.z = 0, and the sum of all lengths. F is the force at the exit point.
     x, y, z = end[0], end[1], end[2] - swivel.weight * free
     w, radius, rz, sz, nz = swivel.weight, swivel.radius, at.rz, at.sz, swivel.z
     sine, cosine, wrap = at.sine, at.cosine, at.wrap
@@ -285,10 +282,8 @@ def _fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Ar
 
 @kernel
 def _end_of(swivel: Swivel, length: float, free: float, force: Vector) -> tuple[float, float, float, float]:
-    """Position of the platform end [m] relative to the anchor, and the free length [m], at a force on the end.
-
-    `length`: unstrained length off the drum [m]. `free`: guess of the free length [m].
-    """
+    """Position of the platform end [m] relative to the anchor, and the free length [m], at a force on the end."""
+    # `length`: unstrained length off the drum [m]. `free`: guess of the free length [m].
     x, y, z = force
     at = _exit_of(swivel, x, y, z - swivel.weight * free)
     for _ in range(LENGTHS):
@@ -309,10 +304,8 @@ def _end_of(swivel: Swivel, length: float, free: float, force: Vector) -> tuple[
 def _force_at(
     swivel: Swivel, end: Vector, length: float, start: tuple[float, float, float, float], rows: Array, i: int
 ) -> tuple[float, float, float, float, float]:
-    """Force at the platform end, free length, and the remaining error of the end relative to the length.
-
-    `end`: platform end relative to the anchor. `start`: guess of force [N] and free length [m]. Damped Newton steps.
-    """
+    """Force at the platform end, free length, and the remaining error of the end relative to the length."""
+    # `end`: platform end relative to the anchor. `start`: guess of force [N] and free length [m]. Damped Newton steps.
     x, y, z, free = start
     bx, by, bz, free = _end_of(swivel, length, free, (x, y, z))
     ex, ey, ez = end[0] - bx, end[1] - by, end[2] - bz
@@ -431,11 +424,9 @@ def _correct(swivel: Swivel, rows: Array, i: int) -> None:
 
 @glue
 def solve_swivels(model: Model, cables: Array, rows: Array) -> None:
-    """Fill forces, planes, free spans and exits of all cables from their tangents and lengths.
-
-    The rows contain the tangents from the pulleys to the platform ends. The chords of the free spans replace them.
-    Cables for which the passes do not converge are solved one by one, by damped Newton steps.
-    """
+    """Fill forces, planes, free spans and exits of all cables from their tangents and lengths."""
+    # The rows contain the tangents from the pulleys to the platform ends. The chords of the free spans replace them.
+    # Cables for which the passes do not converge are solved one by one, by damped Newton steps.
     m, gravity = cables.shape[0], model.gravity if model.code == codes.CATENARY else 0.0
     for i in independent(m):
         _fill_tangent(swivel_at(cables, i, gravity), rows, i)
@@ -649,10 +640,8 @@ DATA_STEP = 1e-4  # relative step of the differences by cable data
 
 @kernel
 def force_slopes_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: Array) -> None:
-    """Fill dT/dL and the derivatives of the force of cable `i` by density, EA, R and dead length, (DATA, m, 3).
-
-    The motion of the platform end at a fixed force is a central difference; its relative error is about 1e-8.
-    """
+    """Fill dT/dL and the derivatives of the force of cable `i` by density, EA, R and dead length, (DATA, m, 3)."""
+    # The motion of the platform end at a fixed force is a central difference; its relative error is about 1e-8.
     s = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
     gravity = s.weight / cables[i, tables.DENSITY] if s.weight > 0.0 else 0.0
     length, free = rows[g.LENGTH, i], rows[g.FREE_LENGTH, i]
@@ -724,17 +713,14 @@ def next_exit(swivel: Swivel, robot: Array, i: int, force: Vector, eyelets: Arra
 
 @entry
 def exits_of_forces(robots: Array, gravity: Array, forces: Array, eyelets: Array, chords: Array, exits: Array) -> None:
-    """Next exit points of cables with swivel axes.
-
-    Args:
-        robots: cable_table with swivel axes, (1 or N, m, SWIVEL_COLUMNS).
-        gravity: Gravity for the weight of the cables [m/s^2], (1 or N,); 0 for cables without weight.
-        forces: Forces at the present exit points, toward the platform ends [N], (N, m, 3).
-        eyelets: Present exit points in world axes [m], (N, m, 3).
-        chords: Lengths of the chords of the free spans [m], (N, m).
-        exits: Filled with the next exit points in world axes [m], the wrap angle [rad], the unstrained length on the
-            pulley and the unstrained dead length [m], (N, m, 6).
-    """
+    """Next exit points of cables with swivel axes."""
+    # robots: cable_table with swivel axes, (1 or N, m, SWIVEL_COLUMNS).
+    # gravity: Gravity for the weight of the cables [m/s^2], (1 or N,); 0 for cables without weight.
+    # forces: Forces at the present exit points, toward the platform ends [N], (N, m, 3).
+    # eyelets: Present exit points in world axes [m], (N, m, 3).
+    # chords: Lengths of the chords of the free spans [m], (N, m).
+    # exits: Filled with the next exit points in world axes [m], the wrap angle [rad], the unstrained length on the
+    #   pulley and the unstrained dead length [m], (N, m, 6).
     for p in range(forces.shape[0]):
         cables = robots[min(p, robots.shape[0] - 1)]
         for i in range(cables.shape[0]):

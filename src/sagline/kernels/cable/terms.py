@@ -83,11 +83,10 @@ class Pulley(NamedTuple):
 
 
 class Cables(NamedTuple):
-    """Data of the cables of one pose, with m values per field.
+    """Data of the cables of one pose, with m values per field."""
 
-    The free span of a cable is the part between the exit point at its pulley and its platform end. If no cable has a
-    pulley or dead length, each free span is the whole cable. Free spans and cables then share memory.
-    """
+    # The free span of a cable is the part between the exit point at its pulley and its platform end. If no cable has a
+    # pulley or dead length, each free span is the whole cable. Free spans and cables then share memory.
 
     machine: bool  # True if any cable has a pulley or dead length
     density: Array  # [kg/m]

@@ -346,10 +346,8 @@ def _free_displacement(free: Array, vector: Triple) -> Triple:
 def _fill_center(
     cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays
 ) -> None:
-    """Add to the columns the effect of a shift of the center of mass, the reference point of platform motion.
-
-    Only the part of the shift along free motions is added, because a planar platform stays in its plane.
-    """
+    """Add to the columns the effect of a shift of the center of mass, the reference point of platform motion."""
+    # Only the part of the shift along free motions is added, because a planar platform stays in its plane.
     m = cables.shape[0]
     at, scale = sought.where[kinds.CENTER + axis, 0], sought.scale[kinds.CENTER + axis, 0]
     back = opposite(_free_displacement(free, _column_of(space.rotation, axis)))

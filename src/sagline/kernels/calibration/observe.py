@@ -91,10 +91,8 @@ def _store_linearization(
 
 @formula
 def _rotation_between(reading_arrays: Array, pose: Array, frame: Array, level: bool) -> Triple:
-    """Rotation vector from the predicted to the measured platform rotation, in the measuring system's axes.
-
-    level: world axes, and the yaw of the reading is replaced by the yaw for which the vector is horizontal.
-    """
+    """Rotation vector from the predicted to the measured platform rotation, in the measuring system's axes."""
+    # level: world axes, and the yaw of the reading is replaced by the yaw for which the vector is horizontal.
     # predicted rotation reading: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
     if level:
@@ -155,17 +153,14 @@ def observe(
     memory: tuple[Array, Indices],
     found: t.LinearizationArrays,
 ) -> None:
-    """Residuals and derivatives at N equilibria; NaN at unstable equilibria.
-
-    Args:
-        model: Cable model as in `forward_poses`: the exact or the weightless model.
-        given: `ForwardSamples`, whose initial poses are equilibria at the lengths.
-        sensing: `Sensing`.
-        reading_arrays: `PoseReadings`.
-        unknown_arrays: `Unknowns`.
-        memory: Work arrays from `memory_for`, for the number of cables.
-        found: `Linearization`, which is filled.
-    """
+    """Residuals and derivatives at N equilibria; NaN at unstable equilibria."""
+    # model: Cable model as in `forward_poses`: the exact or the weightless model.
+    # given: `ForwardSamples`, whose initial poses are equilibria at the lengths.
+    # sensing: `Sensing`.
+    # reading_arrays: `PoseReadings`.
+    # unknown_arrays: `Unknowns`.
+    # memory: Work arrays from `memory_for`, for the number of cables.
+    # found: `Linearization`, which is filled.
     batch, sensors = platform.ForwardSamples(*given), t.Sensing(*sensing)
     readings, sought, answer = t.PoseReadings(*reading_arrays), t.Unknowns(*unknown_arrays), t.Linearization(*found)
     code, k_h, k_p, behind = model
@@ -219,10 +214,8 @@ LEAST = 0.2  # smallest ratio of a corrected tension to the measured tension
 
 @glue
 def _move_into_balance(along: Array, factor: Array, load: Array, tau: Array, least: Array) -> None:
-    """Make the smallest change of the tensions `tau` (m,) that balances `load` (n,), but not below `least` (m,).
-
-    `along`: unit chord wrenches (m, n). `factor`: Cholesky factor of `along`^T `along`. `load` is overwritten.
-    """
+    """Make the smallest change of the tensions `tau` (m,) that balances `load` (n,), but not below `least` (m,)."""
+    # `along`: unit chord wrenches (m, n). `factor`: Cholesky factor of `along`^T `along`. `load` is overwritten.
     m, n = along.shape
     for i in range(m):
         for j in range(n):

@@ -57,10 +57,9 @@ class Unknowns(NamedTuple):
 
 
 class Linearization(NamedTuple):
-    """Output arrays. The rows of a pose are its load cells, then its position (3) and its rotation (3).
+    """Output arrays. The rows of a pose are its load cells, then its position (3) and its rotation (3)."""
 
-    R is m + 6, or m if neither positions nor rotations are measured.
-    """
+    # R is m + 6, or m if neither positions nor rotations are measured.
 
     matrix: Array  # whitened slopes, (N, R, P); rows without a reading are zero
     misfit: Array  # whitened residuals, (N, R)

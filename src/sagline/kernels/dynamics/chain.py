@@ -48,12 +48,10 @@ TINY = 1e-300
 
 @formula
 def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Fill the ratio force/length of every element [N/m]. Returns the power lost in the elements [W].
-
-    place: positions of the nodes [m], (3, nodes), node 0 at the platform and node count + 1 at the frame; speed:
-    velocities of the nodes [m/s], used if the elements have damping; pulls: filled, followed by three work rows, (4
-    nodes,).
-    """
+    """Fill the ratio force/length of every element [N/m]. Returns the power lost in the elements [W]."""
+    # place: positions of the nodes [m], (3, nodes), node 0 at the platform and node count + 1 at the frame; speed:
+    # velocities of the nodes [m/s], used if the elements have damping; pulls: filled, followed by three work rows, (4
+    # nodes,).
     element, stiffness = row[ELEMENT], row[STIFFNESS]
     inverse = 1.0 / element
     for j in range(count):
@@ -100,13 +98,11 @@ def _opening_speed(speed: Array, j: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Add damping forces to taut elements. The total force is never a compression. Returns the power lost [W].
-
-    The forces follow from the speeds after the step (implicit Euler), so that damping does not limit the time step.
-    Each force changes the speeds of the element's two nodes, so that the forces solve a tridiagonal system. The
-    platform and the frame node keep their speeds. Elastic forces and weight also act on the other nodes. The power
-    holds for the mean speed during the step.
-    """
+    """Add damping forces to taut elements. The total force is never a compression. Returns the power lost [W]."""
+    # The forces follow from the speeds after the step (implicit Euler), so that damping does not limit the time step.
+    # Each force changes the speeds of the element's two nodes, so that the forces solve a tridiagonal system. The
+    # platform and the frame node keep their speeds. Elastic forces and weight also act on the other nodes. The power
+    # holds for the mean speed during the step.
     size = place.shape[1]
     factors, values, inverses = pulls[size : 2 * size], pulls[2 * size : 3 * size], pulls[3 * size :]
     inner_rate = row[ELEMENT] / (row[STIFFNESS] * row[LOSS_TIME])  # rate of stretch per force [m/(N s)]
@@ -193,11 +189,9 @@ def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array,
 
 @formula
 def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
-    """Move the nodes for `h` [s]. The node next to the frame keeps its momentum while its mass changes.
-
-    `place`: positions of the nodes [m]. `speed`: their velocities [m/s]. `before`: unstrained length of the element at
-    the frame before the motion [m]. `row`: row of the cable, with this length after the motion. `h`: time [s].
-    """
+    """Move the nodes for `h` [s]. The node next to the frame keeps its momentum while its mass changes."""
+    # `place`: positions of the nodes [m]. `speed`: their velocities [m/s]. `before`: unstrained length of the element
+    # at the frame before the motion [m]. `row`: row of the cable, with this length after the motion. `h`: time [s].
     old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
     middle = 0.5 * (old + new)
     for c in range(3):
@@ -281,10 +275,8 @@ def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
 
 @kernel
 def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Energy per length paid out [N] that the chain loses: H = T + T^2/(2 EA) - w z minus kinetic energy per length.
-
-    While cable is paid out, the sum of `kinetic` and `potential` changes at the rate -H times the rate of the length.
-    """
+    """Energy per length paid out [N] that the chain loses: H = T + T^2/(2 EA) - w z minus kinetic energy per length."""
+    # While cable is paid out, the sum of `kinetic` and `potential` changes at the rate -H times the rate of the length.
     distance = _element_distance(place, count)
     strain = max(_strain_at_exit(row, distance), 0.0)
     elastic = row[STIFFNESS] * strain

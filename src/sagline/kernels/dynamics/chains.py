@@ -345,26 +345,23 @@ def run_chains(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate `steps` steps. Several calls give bitwise the same result as one call with all steps.
-
-    Args:
-        rules: See `Rules`; `stride` is the number of steps per control period of drums.
-        numbers: See `Numbers`.
-        body: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass (including
-            the mass of the chains at node 0); row of inertia; projection (6, 6) onto the free motions; and reference
-            point of the given wrench in these axes, (3,).
-        data: Data of the drives, (DATA_ROWS, m).
-        courses: Time tables of lengths, wrenches and wind velocity; see `motion.run_massless`.
-        kept: Same as in `motion.run_massless`, but with one more counter. The work array has ROOM entries plus two
-            entries per column of the table of lengths.
-        chain_arrays: `Chains`, with the state before the steps; overwritten with the state after them.
-        stock: Initial energies that can be converted to motion, (2,). NaN before the first call.
-        records: Filled as in `motion.run_massless`; also filled with points of the cables (R, m, points, 3) at equal
-            material steps, starting at the frame end. Points between the pieces of a broken cable are not filled.
-        steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the present state is
-            recorded.
-        every: Number of steps between records; the first record is the initial state.
-    """
+    """Integrate `steps` steps. Several calls give bitwise the same result as one call with all steps."""
+    # rules: See `Rules`; `stride` is the number of steps per control period of drums.
+    # numbers: See `Numbers`.
+    # body: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass (including
+    #   the mass of the chains at node 0); row of inertia; projection (6, 6) onto the free motions; and reference point
+    #   of the given wrench in these axes, (3,).
+    # data: Data of the drives, (DATA_ROWS, m).
+    # courses: Time tables of lengths, wrenches and wind velocity; see `motion.run_massless`.
+    # kept: Same as in `motion.run_massless`, but with one more counter. The work array has ROOM entries plus two
+    #   entries per column of the table of lengths.
+    # chain_arrays: `Chains`, with the state before the steps; overwritten with the state after them.
+    # stock: Initial energies that can be converted to motion, (2,). NaN before the first call.
+    # records: Filled as in `motion.run_massless`; also filled with points of the cables (R, m, points, 3) at equal
+    #   material steps, starting at the frame end. Points between the pieces of a broken cable are not filled.
+    # steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the present state is
+    #   recorded.
+    # every: Number of steps between records; the first record is the initial state.
     kind, _remembered, stride = rules
     step, gravity, filtering = numbers
     run = _chain_run_of(rules, numbers, body, data, courses, kept, chain_arrays)

@@ -207,11 +207,9 @@ def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
 
 @glue
 def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
-    """Number of negative eigenvalues of the pivot, the symmetric Phi_uf^-1 `moved`. SINGULAR if almost singular.
-
-    At zero frequency, the determinant of the matrix `moved` is at least one. The determinant is zero if the joint is at
-    a vibration node of the cable between frame end and joint.
-    """
+    """Number of negative eigenvalues of the pivot, the symmetric Phi_uf^-1 `moved`. SINGULAR if almost singular."""
+    # At zero frequency, the determinant of the matrix `moved` is at least one. The determinant is zero if the joint is
+    # at a vibration node of the cable between frame end and joint.
     if d == 1:
         pivot = moved[0, 0].real * phi[0, 1].real
         return SINGULAR if not abs(moved[0, 0]) > clear else int(pivot < 0.0)
@@ -296,17 +294,14 @@ def _cable_stiffness_at(
 def dynamic_stiffnesses(
     strings: Array, waves: Numbers, phase: float, room: Numbers, found: Numbers, counts: Indices
 ) -> None:
-    """Dynamic part K(omega) - K(0) of the stiffness of m strings at N poses.
-
-    Args:
-        strings: (N, m, STRING_COLUMNS).
-        waves: (1 or N, F, WAVE_COLUMNS), with the data type of room and found.
-        phase: Phase of a transverse wave in an element [rad], < pi.
-        room: Work array of shape ROOM.
-        found: Filled with K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN for a cable without force.
-        counts: Filled with the numbers of natural frequencies below omega, platform end fixed, in the plane and normal
-            to it, (N, F, m, 2); negative if the cable has too many elements.
-    """
+    """Dynamic part K(omega) - K(0) of the stiffness of m strings at N poses."""
+    # strings: (N, m, STRING_COLUMNS).
+    # waves: (1 or N, F, WAVE_COLUMNS), with the data type of room and found.
+    # phase: Phase of a transverse wave in an element [rad], < pi.
+    # room: Work array of shape ROOM.
+    # found: Filled with K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN for a cable without force.
+    # counts: Filled with the numbers of natural frequencies below omega, platform end fixed, in the plane and normal to
+    #   it, (N, F, m, 2); negative if the cable has too many elements.
     give, block = room[4 * STAGES : 4 * STAGES + 2, :2], room[4 * STAGES : 4 * STAGES + 2, 2:4]
     for p in range(strings.shape[0]):
         for f in range(waves.shape[1]):

@@ -19,13 +19,10 @@ BIN = 0.005  # length of a bin [m]: a piece of the cable on the drum that has a 
 
 @kernel
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
-    """Wind cable onto a drum. Returns the energy [J] lost by averaging the strain in each bin of cable.
-
-    The strained and the unstrained length of the cable in a bin do not change when its strain is averaged.
-
-    `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out before
-    this step [m]. `step`: length to wind in [m], > 0. `stiffness`: EA [N].
-    """
+    """Wind cable onto a drum. Returns the energy [J] lost by averaging the strain in each bin of cable."""
+    # The strained and the unstrained length of the cable in a bin do not change when its strain is averaged.
+    # `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out
+    # before this step [m]. `step`: length to wind in [m], > 0. `stiffness`: EA [N].
     lost = 0.0
     first, last = _bin_of(layer, place - step), _bin_of(layer, place)
     for k in range(first, last + 1):
@@ -44,11 +41,9 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
 
 @kernel
 def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
-    """Mean strain of the cable that a drum pays out, and the energy [J] that is lost by averaging.
-
-    `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out before
-    this step [m]. `step`: length to pay out [m], > 0. `stiffness`: EA [N].
-    """
+    """Mean strain of the cable that a drum pays out, and the energy [J] that is lost by averaging."""
+    # `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out
+    # before this step [m]. `step`: length to pay out [m], > 0. `stiffness`: EA [N].
     first, last = _bin_of(layer, place), _bin_of(layer, place + step)
     if first == last:
         return layer[first], 0.0
@@ -200,10 +195,8 @@ def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
 
 @formula
 def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> None:
-    """Fill the motor forces from lengths and speeds: P-PI control with anti-windup.
-
-    `targets`: set points of s (m,), then the expected tensions at the drums (m,).
-    """
+    """Fill the motor forces from lengths and speeds: P-PI control with anti-windup."""
+    # `targets`: set points of s (m,), then the expected tensions at the drums (m,).
     m = drives.now.shape[1]
     for i in range(m):
         limit, fastest = drives.data[FORCE_LIMIT, i], drives.data[SPEED_LIMIT, i]

@@ -150,18 +150,15 @@ def damp_cables(
     wrench: Array,
     behind: bool | None,
 ) -> float:
-    """Fill the damping wrench (6,) of the cables. Returns the power lost.
-
-    The strain rate is the same along a whole cable, including the part between exit point and drum. Cable that is paid
-    out lengthens the span by its strained length. The cable stretches or changes its sag at the rate of the chord minus
-    the rate of the strained paid-out length. Only stretching causes damping, with the factor EA/L. The fraction of
-    stretching is the elastic compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. The
-    damping of the air is computed as if the cable moved like its chord.
-
-    losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
-    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives with the velocities of
-    the anchors; the damping parts of its tensions, and the power of the anchors, are filled; wrench: filled.
-    """
+    """Fill the damping wrench (6,) of the cables. Returns the power lost."""
+    # The strain rate is the same along a whole cable, including the part between exit point and drum. Cable that is
+    # paid out lengthens the span by its strained length. The cable stretches or changes its sag at the rate of the
+    # chord minus the rate of the strained paid-out length. Only stretching causes damping, with the factor EA/L. The
+    # fraction of stretching is the elastic compliance divided by the total compliance: 1 for a taut cable, 0 for a
+    # slack cable. The damping of the air is computed as if the cable moved like its chord.
+    # losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
+    # turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives with the velocities
+    # of the anchors; the damping parts of its tensions, and the power of the anchors, are filled; wrench: filled.
     lost = 0.0
     wrench[:] = 0.0
     vx, vy, vz = turning[0], turning[1], turning[2]

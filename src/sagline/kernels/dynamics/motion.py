@@ -168,27 +168,24 @@ def run_massless(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate `steps` steps. Several calls give bitwise the same result as one call with all steps.
-
-    Args:
-        model: See `ModelTerms`.
-        rules: See `Rules`; `stride` is the number of steps per control period of drums.
-        numbers: See `Numbers`.
-        robot: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass (moving
-            frame anchors are overwritten); row of the body_table with the center of mass at zero; row of inertia; free
-            motions (n, 6).
-        data: Data of the drives, (DATA_ROWS, m).
-        courses: Time tables of lengths, wrenches, wind velocity and moving anchors, (K, 3 m). Lengths (K, m) are
-            unstrained. Lengths for drums are lengths s along the path of winding, followed in each row by expected
-            tensions, (K, 2 m).
-        kept: State of the run, and work arrays. The state before the steps is overwritten with the state after them.
-        records: Filled with states (angular velocity in place of angular momentum), frame-end tensions, lengths,
-            energies, notes.
-        steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the initial state is
-            evaluated.
-        every: Number of steps between records. The first record is the initial state. With 0, only the last step is
-            recorded.
-    """
+    """Integrate `steps` steps. Several calls give bitwise the same result as one call with all steps."""
+    # model: See `ModelTerms`.
+    # rules: See `Rules`; `stride` is the number of steps per control period of drums.
+    # numbers: See `Numbers`.
+    # robot: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass (moving
+    #   frame anchors are overwritten); row of the body_table with the center of mass at zero; row of inertia; free
+    #   motions (n, 6).
+    # data: Data of the drives, (DATA_ROWS, m).
+    # courses: Time tables of lengths, wrenches, wind velocity and moving anchors, (K, 3 m). Lengths (K, m) are
+    #   unstrained. Lengths for drums are lengths s along the path of winding, followed in each row by expected
+    #   tensions, (K, 2 m).
+    # kept: State of the run, and work arrays. The state before the steps is overwritten with the state after them.
+    # records: Filled with states (angular velocity in place of angular momentum), frame-end tensions, lengths,
+    #   energies, notes.
+    # steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the initial state is
+    #   evaluated.
+    # every: Number of steps between records. The first record is the initial state. With 0, only the last step is
+    #   recorded.
     integrator, kind, _remembered, _work, stride = rules
     step, filtering = numbers[0], numbers[3]
     moving = massless.massless_run_of(model, rules, numbers, robot, data, courses, kept)

@@ -134,20 +134,17 @@ def begin_period(
     with_wrench: bool,
     end: float,
 ) -> bool:
-    """Extend the time table linearly to new set points. If a set point is invalid, change nothing and return False.
-
-    Args:
-        given: Unstrained lengths (m,); for drums also expected tensions (m,); wrench (6,).
-        least: Lower bounds of the lengths, (m,).
-        stretch: Factors from unstrained lengths to lengths of the time table, (m,).
-        lengths: Unstrained lengths at the end of the last period and at the end of this period, (2, m).
-        course: The time table, see `Course`, with two instants.
-        load: Wrench on the platform, (6,).
-        at: Counters of the run, see `progress`.
-        with_tension: True if tensions are given; otherwise the present tensions are kept.
-        with_wrench: True if a wrench is given; otherwise the present wrench is kept.
-        end: End of the period [s].
-    """
+    """Extend the time table linearly to new set points. If a set point is invalid, change nothing and return False."""
+    # given: Unstrained lengths (m,); for drums also expected tensions (m,); wrench (6,).
+    # least: Lower bounds of the lengths, (m,).
+    # stretch: Factors from unstrained lengths to lengths of the time table, (m,).
+    # lengths: Unstrained lengths at the end of the last period and at the end of this period, (2, m).
+    # course: The time table, see `Course`, with two instants.
+    # load: Wrench on the platform, (6,).
+    # at: Counters of the run, see `progress`.
+    # with_tension: True if tensions are given; otherwise the present tensions are kept.
+    # with_wrench: True if a wrench is given; otherwise the present wrench is kept.
+    # end: End of the period [s].
     time, value, begins, ends = course
     asked, expected, wrench = given
     m = lengths.shape[1]
@@ -185,14 +182,11 @@ def begin_period(
 
 @entry
 def read_cells(tension: Array, cells: Array, noise: Array, reading: Array) -> None:
-    """Fill the readings of load cells, (m,): tensions with gain, bias and noise, clipped to the range of each cell.
-
-    Args:
-        tension: Filtered tensions [N], (m,).
-        cells: Gain, bias, standard deviation and range, (4, m).
-        noise: Noise of standard deviation 1, (m,).
-        reading: Filled.
-    """
+    """Fill the readings of load cells, (m,): tensions with gain, bias and noise, clipped to the range of each cell."""
+    # tension: Filtered tensions [N], (m,).
+    # cells: Gain, bias, standard deviation and range, (4, m).
+    # noise: Noise of standard deviation 1, (m,).
+    # reading: Filled.
     for i in range(tension.shape[0]):
         reading[i] = min(cells[0, i] * tension[i] + cells[1, i] + cells[2, i] * noise[i], cells[3, i])
 
@@ -201,17 +195,14 @@ def read_cells(tension: Array, cells: Array, noise: Array, reading: Array) -> No
 def read_encoders(
     drums: tuple[Array, Array], wound: Array, stretch: Array, zero: Array, rate: Array, room: Array, counts: Array
 ) -> None:
-    """Fill the whole counts of encoders, (m,).
-
-    Args:
-        drums: Table and starts of layers, as in `turns_of_lengths`.
-        wound: Lengths off the drums [m], (m,).
-        stretch: Factors from lengths off the drums to lengths along the path of winding, (m,).
-        zero: Counts at zero turns, (m,).
-        rate: Counts per turn paid out, (m,).
-        room: Work array, (3, 1, m).
-        counts: Filled.
-    """
+    """Fill the whole counts of encoders, (m,)."""
+    # drums: Table and starts of layers, as in `turns_of_lengths`.
+    # wound: Lengths off the drums [m], (m,).
+    # stretch: Factors from lengths off the drums to lengths along the path of winding, (m,).
+    # zero: Counts at zero turns, (m,).
+    # rate: Counts per turn paid out, (m,).
+    # room: Work array, (3, 1, m).
+    # counts: Filled.
     path, turns, travel = room[0], room[1], room[2]
     for i in range(wound.shape[0]):
         path[0, i] = wound[i] * stretch[i]

@@ -49,11 +49,9 @@ def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
 
 @formula
 def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
-    """Rotate by the angle `share` * `pa` [rad] about the first axis. The three axes are in cyclic order.
-
-    `a`, `b`, `c`: vector part of the quaternion along these axes. `w`: its scalar part. `pa`, `pb`, `pc`: angular
-    momentum along these axes. The results are the new quaternion and the new pb and pc.
-    """
+    """Rotate by the angle `share` * `pa` [rad] about the first axis. The three axes are in cyclic order."""
+    # `a`, `b`, `c`: vector part of the quaternion along these axes. `w`: its scalar part. `pa`, `pb`, `pc`: angular
+    # momentum along these axes. The results are the new quaternion and the new pb and pc.
     angle = 0.5 * share * pa
     sine, cosine = math.sin(angle), math.cos(angle)
     whole_sine, whole_cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
@@ -126,15 +124,12 @@ def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
 
 @entry
 def platform_state(state: Array, inertia: Array, center: Array, turn: Array, out: Array) -> None:
-    """Fill the state of the platform frame: position of its origin, quaternion, velocity and angular velocity (13,).
-
-    Args:
-        state: Row of 13 numbers, see the beginning of this module.
-        inertia: Row of inertia.
-        center: Center of mass, relative to the frame's origin, in principal axes (3,).
-        turn: Quaternion of the rotation from frame axes to principal axes, (4,).
-        out: Filled.
-    """
+    """Fill the state of the platform frame: position of its origin, quaternion, velocity and angular velocity (13,)."""
+    # state: Row of 13 numbers, see the beginning of this module.
+    # inertia: Row of inertia.
+    # center: Center of mass, relative to the frame's origin, in principal axes (3,).
+    # turn: Quaternion of the rotation from frame axes to principal axes, (4,).
+    # out: Filled.
     lever = turned(state, center[0], center[1], center[2])
     wx, wy, wz = spin(state, inertia)
     for k in range(3):

@@ -230,19 +230,16 @@ def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
 def spectral_matrices(
     strings: Array, omega: float, rule: Rule, points: Array, plane: Array, normal: Array, carried: Array, still: Array
 ) -> None:
-    """Matrices of m cables, whose eigenvalues are the squared natural angular frequencies with both ends fixed.
-
-    Args:
-        strings: (m, STRING_COLUMNS).
-        omega: Largest angular frequency whose waves the elements resolve [rad/s].
-        rule: `Lobatto`.
-        points: Filled with s, mass and integrals of C of every node, (m, nodes, 6); s is NaN for unused nodes.
-        plane: Filled with scaled stiffness in the plane, (m, 2 nodes, 2 nodes), node by node [1/s^2].
-        normal: Filled with scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
-        carried: Filled with the static motion of each node per motion of the platform end, times the root of the node's
-            mass, (m, nodes, 5).
-        still: Filled with effective masses [kg] of the cable in its static motion, (m, 4): xx, xz, zz, yy.
-    """
+    """Matrices of m cables, whose eigenvalues are the squared natural angular frequencies with both ends fixed."""
+    # strings: (m, STRING_COLUMNS).
+    # omega: Largest angular frequency whose waves the elements resolve [rad/s].
+    # rule: `Lobatto`.
+    # points: Filled with s, mass and integrals of C of every node, (m, nodes, 6); s is NaN for unused nodes.
+    # plane: Filled with scaled stiffness in the plane, (m, 2 nodes, 2 nodes), node by node [1/s^2].
+    # normal: Filled with scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
+    # carried: Filled with the static motion of each node per motion of the platform end, times the root of the node's
+    #   mass, (m, nodes, 5).
+    # still: Filled with effective masses [kg] of the cable in its static motion, (m, 4): xx, xz, zz, yy.
     lobatto = Lobatto(*rule)
     stiff = 1e6 * omega * omega
     for i in range(strings.shape[0]):

@@ -107,16 +107,13 @@ def element_length(string: String, start: float, omega: float, phase: float) -> 
 def fill_routing_compliance(
     terms: Terms, robots: Array, wraps: Array, leaving: Array, rows: Array, strings: Array
 ) -> None:
-    """Fill the compliances in the table of strings, (N, m, STRING_COLUMNS), for cables with pulleys or dead lengths.
-
-    Args:
-        terms: Cable model.
-        robots: cable_table, (1 or N, m, CABLE_COLUMNS).
-        wraps: Wrap angles [rad], (N, m).
-        leaving: Tensions at the exit points [N], (N, m).
-        rows: Work array, (CABLE_ROWS, m).
-        strings: Table of strings, whose other columns are already filled.
-    """
+    """Fill the compliances in the table of strings, (N, m, STRING_COLUMNS), for cables with pulleys or dead lengths."""
+    # terms: Cable model.
+    # robots: cable_table, (1 or N, m, CABLE_COLUMNS).
+    # wraps: Wrap angles [rad], (N, m).
+    # leaving: Tensions at the exit points [N], (N, m).
+    # rows: Work array, (CABLE_ROWS, m).
+    # strings: Table of strings, whose other columns are already filled.
     bare = model_of(terms)
     model = Model(bare.code, bare.k_h, bare.k_p, bare.gravity, True)
     for p in range(strings.shape[0]):

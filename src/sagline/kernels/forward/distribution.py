@@ -189,10 +189,8 @@ def _fill_spread(active: Indices, work: _Distribution) -> bool:
 
 @glue
 def _store_column(work: _Distribution, own: int, direct: float, by_end: float, out: Array, column: int) -> None:
-    """Fill a column of length changes. `work.part`: minus the unbalance, without the direct effect on cable `own`.
-
-    `direct`: direct effect on the chord tension of cable `own`. `by_end`: its derivative at a fixed length.
-    """
+    """Fill a column of length changes. `work.part`: minus the unbalance, without the direct effect on cable `own`."""
+    # `direct`: direct effect on the chord tension of cable `own`. `by_end`: its derivative at a fixed length.
     m, n = work.spread.shape
     for i in range(m):
         total = 0.0
@@ -241,13 +239,12 @@ def sensitivities_of_lengths(
     states: tuple[Array, Array, Array, Array, Array, Array],
     lengths: Array,
 ) -> None:
-    """Sensitivities of the lengths of N poses with tensions nearest to `goals` (1 or N, m) [N].
-
-    The other arguments are the same as in `describe_states` and `inverse_poses`. Vertical swivel axes only. `lengths`:
-    derivatives of the lengths, (N, m, 7 m + 6), to be filled. The columns are displacements of the platform ends
-    relative to the frame ends (3 m), changes of the levers (3 m), goals (m) and the wrench on the platform (6). NaN for
-    a pose without lengths, a singular balance, a vertical chord, and a cable at the limit of its sag.
-    """
+    """Sensitivities of the lengths of N poses with tensions nearest to `goals` (1 or N, m) [N]."""
+    # The other arguments are the same as in `describe_states` and `inverse_poses`. Vertical swivel axes only.
+    # `lengths`: derivatives of the lengths, (N, m, 7 m + 6), to be filled. The columns are displacements of the
+    # platform ends relative to the frame ends (3 m), changes of the levers (3 m), goals (m) and the wrench on the
+    # platform (6). NaN for a pose without lengths, a singular balance, a vertical chord, and a cable at the limit of
+    # its sag.
     n, m = robots[0].shape[0], results.shape[2]
     state, limited = States(*states), TensionLimits(*limits)
     rotation, rest = block(Memory(*memory), 3, 3)

@@ -54,12 +54,10 @@ def _find_pose(
     space: f.ForwardArrays,
     pose: Array,
 ) -> tuple[int, float]:
-    """Find the equilibrium by the first method that succeeds. Returns the number of steps and the sum of tensions.
-
-    On return, `space` contains unbalance, stiffness and factor of the stiffness at the pose. The first number of the
-    factor is NaN if there is no factor. `exact`: a model with an energy. The equilibrium with `exact` is the start of
-    the search with the model of `problem`.
-    """
+    """Find the equilibrium by the first method that succeeds. Returns the number of steps and the sum of tensions."""
+    # On return, `space` contains unbalance, stiffness and factor of the stiffness at the pose. The first number of the
+    # factor is NaN if there is no factor. `exact`: a model with an energy. The equilibrium with `exact` is the start of
+    # the search with the model of `problem`.
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0
     positive = False
@@ -139,18 +137,14 @@ def forward_poses(
     memory: tuple[Array, Indices],
     found: f.SolutionArrays,
 ) -> None:
-    """Solve every sample in turn.
-
-    Args:
-        model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
-            None. With a shallow model, only the last steps use this model; the descent before them uses the exact
-            cable.
-        chained: True if the first sample starts at starts[0], and each later sample at the previous result.
-        given: `ForwardSamples`.
-        chain: `LastEquilibrium`. A chain of samples that starts at this pose also uses the stored stiffness.
-        memory: Work arrays from `memory_for`, for the number of cables.
-        found: `Solutions`, which is filled.
-    """
+    """Solve every sample in turn."""
+    # model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
+    #   None. With a shallow model, only the last steps use this model; the descent before them uses the exact cable.
+    # chained: True if the first sample starts at starts[0], and each later sample at the previous result.
+    # given: `ForwardSamples`.
+    # chain: `LastEquilibrium`. A chain of samples that starts at this pose also uses the stored stiffness.
+    # memory: Work arrays from `memory_for`, for the number of cables.
+    # found: `Solutions`, which is filled.
     batch, answer, kept = f.ForwardSamples(*given), f.Solutions(*found), f.LastEquilibrium(*chain)
     code, k_h, k_p, behind = model
     count = batch.lengths.shape[0]

@@ -22,11 +22,9 @@ from sagline.kernels.statics import components_along, matrix_along, step_pose, s
 
 @kernel
 def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, work: Array, step: Array) -> float:
-    """Fill the step s that minimizes g.s + s.H s/2 within |s| <= `radius`. Returns the shift mu.
-
-    The method of More and Sorensen solves (H + mu 1) s = -g. The number mu is the smallest with a positive definite
-    matrix and a step that is short enough. For mu = 0, the step is an ordinary Newton step.
-    """
+    """Fill the step s that minimizes g.s + s.H s/2 within |s| <= `radius`. Returns the shift mu."""
+    # The method of More and Sorensen solves (H + mu 1) s = -g. The number mu is the smallest with a positive definite
+    # matrix and a step that is short enough. For mu = 0, the step is an ordinary Newton step.
     n = gradient.shape[0]
     frobenius = 0.0
     for i in range(n):
@@ -120,13 +118,11 @@ def predict(
 
 @glue
 def newton_from(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays) -> tuple[int, float]:
-    """Take full Newton steps with the symmetric stiffness. Returns the number of steps and the last sum of tensions.
-
-    The number is 0 if the stiffness is not positive definite or the first step is too long. In these cases, the pose is
-    unchanged, and `space.matrix` is the stiffness at the pose. The number is -1 if the steps do not decrease fast
-    enough. On return, all arrays of space belong to the final pose, except the stiffness. The skew part of the
-    stiffness (half of a given moment) is neglected, which costs one additional step.
-    """
+    """Take full Newton steps with the symmetric stiffness. Returns the number of steps and the last sum of tensions."""
+    # The number is 0 if the stiffness is not positive definite or the first step is too long. In these cases, the pose
+    # is unchanged, and `space.matrix` is the stiffness at the pose. The number is -1 if the steps do not decrease fast
+    # enough. On return, all arrays of space belong to the final pose, except the stiffness. The skew part of the
+    # stiffness (half of a given moment) is neglected, which costs one additional step.
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     rotation, rows, gradient = space.rotation, space.rows, space.gradient
     part, step = space.part, space.step
@@ -170,11 +166,9 @@ def newton_from(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays) -> 
 def _newton_steps(
     problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, best: float, good: float
 ) -> tuple[float, float]:
-    """Take one Newton step for the force balance, shortened until the unbalance is below `best`. Uses the stiffness.
-
-    Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
-    unchanged. An unbalance below `good` can increase by rounding; then only the full step is tried.
-    """
+    """Take one Newton step for the force balance, shortened until the unbalance is below `best`. Uses the stiffness."""
+    # Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
+    # unchanged. An unbalance below `good` can increase by rounding; then only the full step is tried.
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     step, trial, part = space.step, space.trial, space.part
     matrix_along(free, space.stiffness, space.matrix)
@@ -206,11 +200,9 @@ def _newton_steps(
 
 @glue
 def polish(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, good: float) -> int:
-    """Take Newton steps for the force balance until the unbalance no longer decreases. Returns the number of steps.
-
-    `good`: an unbalance below this counts as zero. The work arrays belong to the initial pose before the steps, and to
-    the final pose after the steps. The stiffness may belong to a pose that differs by rounding errors.
-    """
+    """Take Newton steps for the force balance until the unbalance no longer decreases. Returns the number of steps."""
+    # `good`: an unbalance below this counts as zero. The work arrays belong to the initial pose before the steps, and
+    # to the final pose after the steps. The stiffness may belong to a pose that differs by rounding errors.
     best = components_along(problem.free, space.gradient, space.part)
     before = 0.0
     steps = POLISH_STEPS
@@ -234,12 +226,10 @@ NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 @glue
 def descend(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, known: float) -> tuple[int, float]:
-    """Decrease the energy until a full Newton step is short. A pose in equilibrium stays, even if it is unstable.
-
-    `known`: sum of tensions at the pose if `space` contains the arrays and the stiffness of this pose; otherwise 0.
-
-    Returns the number of tried steps, and the sum of tensions at the pose. The sum is 0 if the last pose was rejected.
-    """
+    """Decrease the energy until a full Newton step is short. A pose in equilibrium stays, even if it is unstable."""
+    # `known`: sum of tensions at the pose if `space` contains the arrays and the stiffness of this pose; otherwise 0.
+    # Returns the number of tried steps, and the sum of tensions at the pose. The sum is 0 if the last pose was
+    # rejected.
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     trial, motion, rotation, rows, gradient = space.trial, space.motion, space.rotation, space.rows, space.gradient
     matrix, part, step = space.matrix, space.part, space.step

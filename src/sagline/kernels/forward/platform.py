@@ -141,11 +141,9 @@ def _fill_free(freedom: Array, lengths: Array, free: Array) -> float:
 
 @kernel
 def fill_arcs(freedom: Array, cables: Array, body: Array, arcs: Array) -> None:
-    """Fill the free motions in the units for comparing stiffnesses, (n, 6).
-
-    A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass, so
-    that every stiffness is in N/m.
-    """
+    """Fill the free motions in the units for comparing stiffnesses, (n, 6)."""
+    # A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass,
+    # so that every stiffness is in N/m.
     m = cables.shape[0]
     square = 0.0
     for i in range(m):
@@ -178,11 +176,9 @@ Six = tuple[float, float, float, float, float, float]
 def unbalance(
     model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array, gradient: Array
 ) -> float:
-    """Fill rotation, geometry, cable forces and statuses at `pose`, and the unbalance `gradient` (6,).
-
-    The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N]: the reference of a
-    relative unbalance.
-    """
+    """Fill rotation, geometry, cable forces and statuses at `pose`, and the unbalance `gradient` (6,)."""
+    # The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N]: the reference of
+    # a relative unbalance.
     cable_geometry(cables, body, pose, rotation, rows)
     forces_from_lengths(model, cables, rows, model.behind)
     weight = body[tables.MASS] * model.gravity
@@ -219,11 +215,10 @@ def add_world_force(rows: Array, i: int, force: Triple, wrench: Array) -> None:
 def platform_energy(
     model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array
 ) -> tuple[float, float]:
-    """Energy [J] after `unbalance` at the pose, and the sum of the magnitudes of its terms (a measure of rounding).
-
-    The terms are the energies of cables, weight and given force. The result is NaN if the cable model has no energy. A
-    given moment, which is constant in world axes, has no potential energy. A given moment is therefore not included.
-    """
+    """Energy [J] after `unbalance` at the pose, and the sum of the magnitudes of its terms (a measure of rounding)."""
+    # The terms are the energies of cables, weight and given force. The result is NaN if the cable model has no energy.
+    # A given moment, which is constant in world axes, has no potential energy. A given moment is therefore not
+    # included.
     energy, size = energy_of_cables(model, cables, rows, model.behind)
     for k in range(3):
         center = pose[k]

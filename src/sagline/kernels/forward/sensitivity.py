@@ -62,11 +62,9 @@ def _describe_cable(
 
 @formula
 def _at_frame_end(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float, float, float]:
-    """Coefficients of the change of the frame-end tension of cable `i`.
-
-    Three for the change of the force on the platform end, world axes; one for the rise of the platform end [N/m]; one
-    for the change of the length [N/m]. H = T + T^2/(2 EA) - w z is constant along a cable.
-    """
+    """Coefficients of the change of the frame-end tension of cable `i`."""
+    # Three for the change of the force on the platform end, world axes; one for the rise of the platform end [N/m]; one
+    # for the change of the length [N/m]. H = T + T^2/(2 EA) - w z is constant along a cable.
     horizontal, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
     cx, cy = (rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]) if horizontal > 0.0 else (0.0, 0.0)
     x, y = horizontal * cx, horizontal * cy
@@ -197,10 +195,8 @@ class _Sensitivities(NamedTuple):
 
 @kernel
 def invert_scaled(matrix: Array, inverse: Array, scale: Array) -> bool:
-    """Fill the `inverse` (n, n) of a matrix that is scaled to diagonal elements of 1. False if it is singular.
-
-    Destroys `matrix`; `scale`: work array (n,). Forces and moments get similar magnitudes.
-    """
+    """Fill the `inverse` (n, n) of a matrix that is scaled to diagonal elements of 1. False if it is singular."""
+    # Destroys `matrix`; `scale`: work array (n,). Forces and moments get similar magnitudes.
     n = matrix.shape[0]
     for j in range(n):
         scale[j] = 1.0 / math.sqrt(abs(matrix[j, j])) if abs(matrix[j, j]) > 0.0 else 1.0
@@ -317,10 +313,8 @@ def sensitivities_of_states(
     states: tuple[Array, Array, Array, Array, Array, Array],
     found: tuple[Array, Array, Array, Array, Array, Array],
 ) -> None:
-    """Sensitivities of the pose and of tensions at N equilibria, NaN at a singular stiffness.
-
-    The arguments are the same as in `describe_states`. `found`: arrays of `_Sensitivities`, which are filled.
-    """
+    """Sensitivities of the pose and of tensions at N equilibria, NaN at a singular stiffness."""
+    # The arguments are the same as in `describe_states`. `found`: arrays of `_Sensitivities`, which are filled.
     n, m = robots[0].shape[0], results.shape[2]
     state, out = States(*states), _Sensitivities(*found)
     rotation, rest = block(Memory(*memory), 3, 3)
@@ -369,10 +363,8 @@ def compliances_of(free: Array, matrices: Array, memory: tuple[Array, Indices], 
 
 @entry
 def least_stiffnesses(free: Array, matrices: Array, memory: tuple[Array, Indices], least: Array) -> None:
-    """Fill the stiffnesses (N,) against a force on the center of mass in the softest direction [N/m]; 0 if unstable.
-
-    `matrices`: stiffnesses of the platform, (N, 6, 6), or NaN.
-    """
+    """Fill the stiffnesses (N,) against a force on the center of mass in the softest direction [N/m]; 0 if unstable."""
+    # `matrices`: stiffnesses of the platform, (N, 6, 6), or NaN.
     n = free.shape[0]
     work, rest = block(Memory(*memory), 2 * n + 1, n)
     compliance, rest = block(rest, 6, 6)
@@ -447,12 +439,10 @@ def stabilities_of_poses(
     results: Array,
     pose_statuses: Codes,
 ) -> None:
-    """Decide whether the equilibria of solved poses are stable.
-
-    The arguments are the same as in `inverse_poses` and `forward_poses`; `which` (K,) are the indices of the poses. The
-    status of each becomes POSE_SOLVED if every free motion has a positive stiffness, else POSE_UNSTABLE. The stiffness
-    of straight cables is undefined. Poses with straight cables therefore count as solved.
-    """
+    """Decide whether the equilibria of solved poses are stable."""
+    # The arguments are the same as in `inverse_poses` and `forward_poses`; `which` (K,) are the indices of the poses.
+    # The status of each becomes POSE_SOLVED if every free motion has a positive stiffness, else POSE_UNSTABLE. The
+    # stiffness of straight cables is undefined. Poses with straight cables therefore count as solved.
     code, k_h, k_p, behind = terms
     freedom, bodies, tables_of_cables = robots
     n, m = freedom.shape[0], results.shape[2]

@@ -121,10 +121,8 @@ def _square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> 
 def _least_of_pair(
     one: Array, other: Array, i: int, j: int, precision: float, enough: float, pieces: Array, waiting: Array
 ) -> tuple[float, float, float, float]:
-    """Least distance [m] of a cable from another cable or a box, a proved lower bound, and the two nearest points.
-
-    If the distance exceeds `enough`, the search ends early with a lower bound of at least `enough` - `precision`.
-    """
+    """Least distance [m] of a cable from another cable or a box, a proved lower bound, and the two nearest points."""
+    # If the distance exceeds `enough`, the search ends early with a lower bound of at least `enough` - `precision`.
     to_a_box = other[shapes.KIND] == shapes.BOX
     distance, low, s, t = _chord_distance(pieces, i, j, other, to_a_box)
     if math.isnan(distance):
@@ -237,22 +235,19 @@ def least_distances(
     low_out: Array,
     nearest_out: Array,
 ) -> None:
-    """Fill the least distances of pairs at every pose, minus the radii, with proved lower bounds and nearest points.
-
-    Args:
-        moving: Shapes that move with the pose, shape (N, K, COLUMNS).
-        still: Fixed shapes, shape (S, COLUMNS).
-        pairs: Indices of two shapes, shape (P, 2). The indices of fixed shapes follow the indices of moving shapes. A
-            box is the second shape of a pair.
-        precision: Largest difference of the lower bound from the distance [m].
-        together: True if only the least distance over all pairs of a pose is required. If True, all other pairs get
-            only bounds.
-        pieces: Work array from `work_arrays_for_pieces`.
-        waiting: Work array from `work_arrays_for_pieces`.
-        distance_out: Filled with the distances [m], shape (N, P).
-        low_out: Filled with the proved lower bounds [m], shape (N, P).
-        nearest_out: Filled with the nearest points on the center lines or boxes [m], shape (N, P, 2, 3).
-    """
+    """Fill the least distances of pairs at every pose, minus the radii, with proved lower bounds and nearest points."""
+    # moving: Shapes that move with the pose, shape (N, K, COLUMNS).
+    # still: Fixed shapes, shape (S, COLUMNS).
+    # pairs: Indices of two shapes, shape (P, 2). The indices of fixed shapes follow the indices of moving shapes. A box
+    #   is the second shape of a pair.
+    # precision: Largest difference of the lower bound from the distance [m].
+    # together: True if only the least distance over all pairs of a pose is required. If True, all other pairs get only
+    #   bounds.
+    # pieces: Work array from `work_arrays_for_pieces`.
+    # waiting: Work array from `work_arrays_for_pieces`.
+    # distance_out: Filled with the distances [m], shape (N, P).
+    # low_out: Filled with the proved lower bounds [m], shape (N, P).
+    # nearest_out: Filled with the nearest points on the center lines or boxes [m], shape (N, P, 2, 3).
     poses, several = moving.shape[0], moving.shape[1]
     count = several + still.shape[0]
     for k in range(still.shape[0]):
@@ -287,13 +282,10 @@ def least_distances(
 
 @entry
 def cut_piece(row: Array, ranges: Array, pieces_out: Array) -> None:
-    """Fill chords and bulges of pieces of one cable or rod.
-
-    Args:
-        row: The cable, shape (COLUMNS,).
-        ranges: First and last shares of the pieces, shape (K, 2).
-        pieces_out: Filled with chords and bulges, shape (K, PIECE_COLUMNS).
-    """
+    """Fill chords and bulges of pieces of one cable or rod."""
+    # row: The cable, shape (COLUMNS,).
+    # ranges: First and last shares of the pieces, shape (K, 2).
+    # pieces_out: Filled with chords and bulges, shape (K, PIECE_COLUMNS).
     for k in range(ranges.shape[0]):
         piece, first, last = pieces_out[k], ranges[k, 0], ranges[k, 1]
         piece[0], piece[1], piece[2] = shapes.point(row, first)

@@ -50,11 +50,9 @@ def point(row: Array, share: float) -> tuple[float, float, float]:
 
 @kernel
 def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
-    """First and second derivatives of (x, z) in the cable's plane with respect to the share of its length [m].
-
-    With t the tension and T the force, the derivatives with respect to the unstrained length are r' = T (1/t + 1/EA)
-    and r'' = (-T_x T_z w/t^3, w T_x^2/t^3 + w/EA).
-    """
+    """First and second derivatives of (x, z) in the cable's plane with respect to the share of its length [m]."""
+    # With t the tension and T the force, the derivatives with respect to the unstrained length are r' = T (1/t + 1/EA)
+    # and r'' = (-T_x T_z w/t^3, w T_x^2/t^3 + w/EA).
     if row[KIND] != HANGING:
         return row[SPAN], row[RISE] - row[DROP] * (1.0 - 2.0 * share), 0.0, 2.0 * row[DROP]
     length, weight, horizontal = row[LENGTH], row[WEIGHT], row[HORIZONTAL]
@@ -79,11 +77,9 @@ def level_point(row: Array) -> float:
 
 @kernel
 def bulge(row: Array, first: float, last: float, chord2: float) -> float:
-    """Largest distance of the points of a piece from its chord [m]; `square` is the squared chord.
-
-    The result is the smaller of two upper bounds. The first bound is |r''| (s1 - s0)^2/8 with the least tension on the
-    piece. The second bound follows from the length of the piece and the distance of its ends, also for folds.
-    """
+    """Largest distance of the points of a piece from its chord [m]; `square` is the squared chord."""
+    # The result is the smaller of two upper bounds. The first bound is |r''| (s1 - s0)^2/8 with the least tension on
+    # the piece. The second bound follows from the length of the piece and the distance of its ends, also for folds.
     width = last - first
     if row[KIND] != HANGING:
         return abs(row[DROP]) * width * width * 0.25

@@ -40,17 +40,14 @@ def decide_poses(
     answers: inverse.Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
-    """Decide with chord tensions whether poses are feasible that the distribution iterations reported as infeasible.
-
-    The tensions of feasible poses are filled.
-
-    The arguments are the same as in `inverse_poses`, and:
-
-    `which`: indices of the poses, (K,). `covers`: True if the method finds a distribution at every feasible pose. If
-    False, a feasible pose gets POSE_NOT_COVERED. `verdicts`: filled for the poses `which`: lower and upper bound [N] of
-    the least change of the force that makes the pose feasible, (N, 2); this change along the free motions, (N, n), and
-    Farkas vectors, (N, n), both NaN if not found; True for each cable whose limit opposes the needed wrench, (N, m).
-    """
+    """Decide with chord tensions whether poses are feasible that the distribution iterations reported as infeasible."""
+    # The tensions of feasible poses are filled.
+    # The arguments are the same as in `inverse_poses`, and:
+    # `which`: indices of the poses, (K,). `covers`: True if the method finds a distribution at every feasible pose. If
+    # False, a feasible pose gets POSE_NOT_COVERED. `verdicts`: filled for the poses `which`: lower and upper bound [N]
+    # of the least change of the force that makes the pose feasible, (N, 2); this change along the free motions, (N, n),
+    # and Farkas vectors, (N, n), both NaN if not found; True for each cable whose limit opposes the needed wrench, (N,
+    # m).
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
@@ -119,10 +116,8 @@ def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[Demand, TensionC
 def demand_of_pose(
     platform: statics.Platform, cables: Cables, balance: statics.Balance, demand: Demand, change: TensionChange
 ) -> tuple[Demand, float]:
-    """Fill the demand that a pose sets to its cables, and the initial tensions of the search.
-
-    Returns the demand, and the lever arm [m] by which its moments are divided.
-    """
+    """Fill the demand that a pose sets to its cables, and the initial tensions of the search."""
+    # Returns the demand, and the lever arm [m] by which its moments are divided.
     n, m = balance.matrix.shape
     statics.fill_needed_wrench(platform, cables, balance)
     statics.start_from_minimum_norm(balance)
@@ -202,16 +197,13 @@ def polygon_of_pose(
     memory: tuple[Array, Indices],
     polygon: tuple[Array, Array, Array, Array, Array, Indices],
 ) -> int:
-    """Fill the set of feasible tensions of one pose at fixed sag forces. Returns the number of corners of the set.
-
-    The arguments are the same as in `inverse_poses`, for one robot and one pose. From `distribution_terms`, only the
-    variable is used.
-
-    `carried`: chord tensions and sag forces of the cables, (m,) each. For NaN, first-order sag forces are used.
-    `polygon`: filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
-    space (r, m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval, corners[0,
-    0] and corners[1, 0], which may be infinite.
-    """
+    """Fill the set of feasible tensions of one pose at fixed sag forces. Returns the number of corners of the set."""
+    # The arguments are the same as in `inverse_poses`, for one robot and one pose. From `distribution_terms`, only the
+    # variable is used.
+    # `carried`: chord tensions and sag forces of the cables, (m,) each. For NaN, first-order sag forces are used.
+    # `polygon`: filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
+    # space (r, m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval,
+    # corners[0, 0] and corners[1, 0], which may be infinite.
     distribution = Distribution(*distribution_terms)
     freedom, bodies, robots = robot_terms
     tensions, sag_forces = carried

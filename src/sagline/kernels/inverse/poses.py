@@ -55,12 +55,10 @@ def distribute_and_solve_cables(
     model: Model, distribution: nearest.Distribution, platform: statics.Platform, cables: Cables,
     balance: statics.Balance, near: nearest.ReferencePoint, work: WorkArrays | None, statuses: Codes,
 ) -> int:  # fmt: skip
-    """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status.
-
-    `cables`: the cables from `set_pose`, with tensions, ratios and sag forces to be filled. `work`: work arrays for
-    frame-end tensions and for methods that are not projections; if None, this code is not compiled. `statuses`: filled
-    with the status of each cable, (m,).
-    """
+    """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status."""
+    # `cables`: the cables from `set_pose`, with tensions, ratios and sag forces to be filled. `work`: work arrays for
+    # frame-end tensions and for methods that are not projections; if None, this code is not compiled. `statuses`:
+    # filled with the status of each cable, (m,).
     near.held.labels[0] = 0
     if work is not None:
         reset_work_arrays(work)
@@ -214,30 +212,27 @@ def inverse_poses(
     first: int,
     last: int,
 ) -> None:
-    """Solve part of a batch, pose by pose. With CLOSEST, the tensions of each feasible pose are the next reference.
-
-    Args:
-        model_terms: Cable model: code, k_h, k_p.
-        distribution_terms: Tension distribution: `Distribution`.
-        limit_terms: Limits of the tensions: `TensionLimits`.
-        robot_terms: Rows that select the free motions, translations first, (n, 6); body_table, (1 or N, BODY_COLUMNS);
-            cable_table, (1 or N, m, CABLE_COLUMNS).
-        poses: Rows (N, POSE_COLUMNS).
-        wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
-        previous: Reference tensions in the distribution's variable (m,), NaN for the minimum norm. CLOSEST overwrites
-            `previous` with the tensions of the last feasible pose.
-        memory: Work arrays from `memory_for`, for the number of cables.
-        otherwise: True for any method. None if the method is a projection in chord or horizontal tensions; the code of
-            all other methods is then not compiled.
-        stability: True to prove the stability of each equilibrium. A solved pose without a proof then gets
-            UNPROVED_STABILITY. With None, the proof is not compiled.
-        answers: Filled with span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and then
-            the rows for pulleys and dead lengths, if any, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
-            the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply
-            along the free motions, (N, n); status of each pose, (N,).
-        first: Index of the first pose.
-        last: Index after the last pose.
-    """
+    """Solve part of a batch, pose by pose. With CLOSEST, the tensions of each feasible pose are the next reference."""
+    # model_terms: Cable model: code, k_h, k_p.
+    # distribution_terms: Tension distribution: `Distribution`.
+    # limit_terms: Limits of the tensions: `TensionLimits`.
+    # robot_terms: Rows that select the free motions, translations first, (n, 6); body_table, (1 or N, BODY_COLUMNS);
+    #   cable_table, (1 or N, m, CABLE_COLUMNS).
+    # poses: Rows (N, POSE_COLUMNS).
+    # wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
+    # previous: Reference tensions in the distribution's variable (m,), NaN for the minimum norm. CLOSEST overwrites
+    #   `previous` with the tensions of the last feasible pose.
+    # memory: Work arrays from `memory_for`, for the number of cables.
+    # otherwise: True for any method. None if the method is a projection in chord or horizontal tensions; the code of
+    #   all other methods is then not compiled.
+    # stability: True to prove the stability of each equilibrium. A solved pose without a proof then gets
+    #   UNPROVED_STABILITY. With None, the proof is not compiled.
+    # answers: Filled with span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and then the
+    #   rows for pulleys and dead lengths, if any, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of the
+    #   unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply along the
+    #   free motions, (N, n); status of each pose, (N,).
+    # first: Index of the first pose.
+    # last: Index after the last pose.
     distribution = nearest.Distribution(*distribution_terms)
     limits = states.TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms

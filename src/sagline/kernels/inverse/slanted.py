@@ -25,10 +25,8 @@ SAME_EXIT = 2e-12  # change of an exit point after which the next change is a ro
 
 @glue
 def _move_exits(model: Model, robot: Array, cables: Cables, geometry: Array, eyelets: Array) -> float:
-    """Move the frame anchors of `eyelets` to the exit points of the present forces. Returns the largest change.
-
-    The change is relative to the free span. `robot`: rows of a cable_table with swivel axes.
-    """
+    """Move the frame anchors of `eyelets` to the exit points of the present forces. Returns the largest change."""
+    # The change is relative to the free span. `robot`: rows of a cable_table with swivel axes.
     gravity = model.gravity if model.code == codes.CATENARY else 0.0
     change = 0.0
     for i in range(cables.tau.size):
@@ -58,14 +56,11 @@ def inverse_poses_of_slanted(
     first: int,
     last: int,
 ) -> None:
-    """Solve part of a batch with swivel axes of any direction, pose by pose.
-
-    The arguments are the same as in `inverse_poses`, and:
-
-    `robot_terms`: with the cable_table of the cables from eyelets, (N, m, CABLE_COLUMNS). Its frame anchors are the
-    initial exit points, and are replaced by the exit points found. `swivels`: cable_table with swivel axes, (1 or N, m,
-    SWIVEL_COLUMNS).
-    """
+    """Solve part of a batch with swivel axes of any direction, pose by pose."""
+    # The arguments are the same as in `inverse_poses`, and:
+    # `robot_terms`: with the cable_table of the cables from eyelets, (N, m, CABLE_COLUMNS). Its frame anchors are the
+    # initial exit points, and are replaced by the exit points found. `swivels`: cable_table with swivel axes, (1 or N,
+    # m, SWIVEL_COLUMNS).
     distribution = nearest.Distribution(*distribution_terms)
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, _eyelets = robot_terms

@@ -109,10 +109,8 @@ def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balan
 
 @glue
 def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
-    """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N].
-
-    Without pulleys, the bounds are exact. For deep sag, beyond the range of the polynomial, the bounds are infinite.
-    """
+    """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N]."""
+    # Without pulleys, the bounds are exact. For deep sag, beyond the range of the polynomial, the bounds are infinite.
     for i in range(cables.tau.size):
         length = cables.ratio[i] * cables.free_chord[i]
         weight = cables.density[i] * model.gravity if model.code == codes.CATENARY else 0.0

@@ -142,11 +142,9 @@ def _fill_first_tensions(freedom: Array, lever: float, balance: statics.Balance,
 
 @glue
 def _fill_stiffness(cables: Cables, geometry: Array, stiffness: Array) -> None:
-    """Fill the derivative of the cables' wrench with respect to the motion at constant tensions, (6, 6).
-
-    The motion is the displacement of the center of mass, then the rotation about it. The sag force is proportional to
-    the chord.
-    """
+    """Fill the derivative of the cables' wrench with respect to the motion at constant tensions, (6, 6)."""
+    # The motion is the displacement of the center of mass, then the rotation about it. The sag force is proportional to
+    # the chord.
     stiffness[:] = 0.0
     for i in range(cables.tau.size):
         ux = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_X, i]
@@ -219,11 +217,9 @@ def _fill_system(search: _Search, space: _UnderconstrainedArrays) -> None:
 
 @glue
 def _take_step(search: _Search, space: _UnderconstrainedArrays, floor: float) -> tuple[float, bool]:
-    """Move pose and tensions by the shortened step. Returns the step size, and True if a tension is too small.
-
-    `floor`: smallest tension of a cable, relative to its smallest admissible tension. `search.blocking` is filled: True
-    for the cables that the step would take below this tension.
-    """
+    """Move pose and tensions by the shortened step. Returns the step size, and True if a tension is too small."""
+    # `floor`: smallest tension of a cable, relative to its smallest admissible tension. `search.blocking` is filled:
+    # True for the cables that the step would take below this tension.
     platform, cables, pose, tau = search.platform, search.curves.cables, search.pose, space.tau
     freedom, step, n = platform.freedom, space.step, platform.freedom.shape[0]
     shift, square = statics.squares_along(freedom, step)
@@ -247,11 +243,9 @@ def _take_step(search: _Search, space: _UnderconstrainedArrays, floor: float) ->
 
 @glue
 def _find_equilibrium(search: _Search, space: _UnderconstrainedArrays) -> int:
-    """Take Newton steps until the balance holds. Returns POSE_SOLVED or the failure.
-
-    The pose of `search` and the tensions of `space` contain the initial values, and at the end the last values. Steps
-    that stop at a smallest admissible tension can miss an equilibrium slightly above it; the search continues below.
-    """
+    """Take Newton steps until the balance holds. Returns POSE_SOLVED or the failure."""
+    # The pose of `search` and the tensions of `space` contain the initial values, and at the end the last values. Steps
+    # that stop at a smallest admissible tension can miss an equilibrium slightly above it; the search continues below.
     model, cables, tau = search.curves.model, search.curves.cables, space.tau
     status = codes.POSE_NO_EQUILIBRIUM
     waited, floor = 0, 1.0
@@ -324,16 +318,13 @@ def underconstrained_poses(
     first: int,
     last: int,
 ) -> None:
-    """Solve part of a batch of platforms with fewer cables than degrees of freedom.
-
-    The arguments are the same as in `inverse_poses`, with m < n, and:
-
-    `starts`: rows with the given coordinates, (N, POSE_COLUMNS); their other coordinates are initial values. `given`:
-    codes of the given values, (m,): 0, 1 and 2 for coordinates of the origin, YAW, LEVEL. `level`: tension level [N],
-    component of the chord tensions along a unit vector: the tensions with the smallest wrench at the initial pose.
-    `chained`: True to start each pose at rotation and tensions of the previous pose. `poses`: filled with the
-    poses; a pose without a solution is the start. `blocking`: filled, (N, m): cables with violated limits.
-    """
+    """Solve part of a batch of platforms with fewer cables than degrees of freedom."""
+    # The arguments are the same as in `inverse_poses`, with m < n, and:
+    # `starts`: rows with the given coordinates, (N, POSE_COLUMNS); their other coordinates are initial values. `given`:
+    # codes of the given values, (m,): 0, 1 and 2 for coordinates of the origin, YAW, LEVEL. `level`: tension level [N],
+    # component of the chord tensions along a unit vector: the tensions with the smallest wrench at the initial pose.
+    # `chained`: True to start each pose at rotation and tensions of the previous pose. `poses`: filled with the poses;
+    # a pose without a solution is the start. `blocking`: filled, (N, m): cables with violated limits.
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers

@@ -50,11 +50,9 @@ def component_along(columns: Array, direction: Array, i: int) -> float:
 
 @kernel
 def _spare_capacity(curves: sag_forces.Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
-    """Largest force [N] of the cables along `direction`, minus the demand. A negative value proves infeasibility.
-
-    The value is an upper bound that includes rounding errors. tops: filled with the largest contribution of each cable,
-    (m,).
-    """
+    """Largest force [N] of the cables along `direction`, minus the demand. A negative value proves infeasibility."""
+    # The value is an upper bound that includes rounding errors. tops: filled with the largest contribution of each
+    # cable, (m,).
     spare = 0.0
     size = 0.0
     for k in range(direction.size):
@@ -72,10 +70,8 @@ def _spare_capacity(curves: sag_forces.Curves, demand: Demand, range_: Array, di
 def _narrow_range(
     curves: sag_forces.Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array
 ) -> bool:
-    """Remove from `range_` the tensions at which a cable is below its largest contribution by more than `spare`.
-
-    Returns False if the range becomes empty.
-    """
+    """Remove from `range_` the tensions at which a cable is below its largest contribution by more than `spare`."""
+    # Returns False if the range becomes empty.
     if not spare < math.inf:
         return True
     for i in range(tops.size):
@@ -99,10 +95,8 @@ def _narrow_range(
 def _narrow_free(
     curves: sag_forces.Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
 ) -> bool:
-    """Narrow a range along directions to which only one of the cables between their limits contributes.
-
-    Returns False if the range becomes empty.
-    """
+    """Narrow a range along directions to which only one of the cables between their limits contributes."""
+    # Returns False if the range becomes empty.
     n, m = demand.matrix.shape
     count = 0
     for i in range(m):
@@ -182,11 +176,9 @@ def _first_range(curves: sag_forces.Curves, size: float, range_: Array) -> None:
 def _approach_demand(
     curves: sag_forces.Curves, demand: Demand, range_: Array, trial: TensionChange, memory: Memory
 ) -> tuple[float, bool]:
-    """Compute the tensions in `range_` whose wrench is closest to `demand`.
-
-    Returns the residual force [N], and True if the moments balance. If the moments cannot balance, the force is
-    infinite, and the direction has only a moment part.
-    """
+    """Compute the tensions in `range_` whose wrench is closest to `demand`."""
+    # Returns the residual force [N], and True if the moments balance. If the moments cannot balance, the force is
+    # infinite, and the direction has only a moment part.
     n, m = demand.matrix.shape
     first = demand.soft
     for i in range(m):
@@ -207,13 +199,11 @@ def _approach_demand(
 def decide_feasibility(
     curves: sag_forces.Curves, demand: Demand, nodes: int, change: TensionChange, memory: Memory
 ) -> tuple[int, float, float, bool]:
-    """Decide whether tensions within the cables' limits can supply `demand`.
-
-    `nodes`: largest number of examined ranges. `change`: initial tensions, overwritten with the tensions with the least
-    residual, this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or
-    POSE_NOT_CONVERGED after an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if a single
-    direction proves infeasibility for the whole first range.
-    """
+    """Decide whether tensions within the cables' limits can supply `demand`."""
+    # `nodes`: largest number of examined ranges. `change`: initial tensions, overwritten with the tensions with the
+    # least residual, this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or
+    # POSE_NOT_CONVERGED after an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if a
+    # single direction proves infeasibility for the whole first range.
     n, m = demand.matrix.shape
     tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]
     waiting, rest = block(rest, DEPTH, RANGE_ROWS * m)

@@ -114,11 +114,9 @@ def norm_of_part(vector: Array, first: int, last: int) -> float:
 
 @glue
 def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: _Tangents) -> bool:
-    """Fill the tangents at `tau`, and the normal matrix. False if the hard rows are linearly dependent.
-
-    The normal matrix includes the second derivatives of the curves, times the multipliers (n,) of the previous step, if
-    they make the matrix more positive definite. Without them, steps would oscillate.
-    """
+    """Fill the tangents at `tau`, and the normal matrix. False if the hard rows are linearly dependent."""
+    # The normal matrix includes the second derivatives of the curves, times the multipliers (n,) of the previous step,
+    # if they make the matrix more positive definite. Without them, steps would oscillate.
     n, m = step.matrix.shape
     soft = demand.soft
     hard = n - soft
@@ -203,13 +201,10 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
 
 @glue
 def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
-    """Fill the direction of the residual after a full step. The soft rows of the direction have length 1.
-
-    Returns the length of the soft rows before this scaling [N].
-
-    The direction is perpendicular to the tangents of cables between their limits. For a cable at a limit, the direction
-    points beyond the limit.
-    """
+    """Fill the direction of the residual after a full step. The soft rows of the direction have length 1."""
+    # Returns the length of the soft rows before this scaling [N].
+    # The direction is perpendicular to the tangents of cables between their limits. For a cable at a limit, the
+    # direction points beyond the limit.
     n, m = step.matrix.shape
     hard = n - soft
     y, along, trial = change.direction, step.bounds[START], step.trial[0]
@@ -233,11 +228,9 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Halve a step until it gives the required decrease. False if no step does so, or if the result is worse.
-
-    The weight of the hard residual exceeds the multipliers of the hard rows. A larger hard residual is therefore never
-    accepted in exchange for a smaller soft residual.
-    """
+    """Halve a step until it gives the required decrease. False if no step does so, or if the result is worse."""
+    # The weight of the hard residual exceeds the multipliers of the hard rows. A larger hard residual is therefore
+    # never accepted in exchange for a smaller soft residual.
     n, m = demand.matrix.shape
     soft = demand.soft
     trial, trial_sag_force, left = step.trial

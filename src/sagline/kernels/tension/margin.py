@@ -42,10 +42,8 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 @glue
 def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
-    """Add the columns `chosen[first:]` to the frame (n, n). Returns the number of rows of the frame.
-
-    A column that depends linearly on the columns before it adds no row.
-    """
+    """Add the columns `chosen[first:]` to the frame (n, n). Returns the number of rows of the frame."""
+    # A column that depends linearly on the columns before it adds no row.
     n = matrix.shape[0]
     held = first
     for c in range(first, chosen.size):
@@ -97,16 +95,13 @@ def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tup
 
 @kernel
 def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
-    """Largest force [N] that can be added to `needed` in every direction. Negative if `needed` is infeasible.
-
-    Args:
-        matrix: Structure matrix along the free motions, translations first, (n, m).
-        needed: Wrench to supply, in the same rows, (n,).
-        low: Smallest allowed tensions (m,).
-        high: Largest allowed tensions (m,), may be infinite.
-        translations: Number of rows of the matrix that are force components.
-        memory: Work memory.
-    """
+    """Largest force [N] that can be added to `needed` in every direction. Negative if `needed` is infeasible."""
+    # matrix: Structure matrix along the free motions, translations first, (n, m).
+    # needed: Wrench to supply, in the same rows, (n,).
+    # low: Smallest allowed tensions (m,).
+    # high: Largest allowed tensions (m,), may be infinite.
+    # translations: Number of rows of the matrix that are force components.
+    # memory: Work memory.
     n, m = matrix.shape
     frame, memory = block(memory, n, n)
     triangle, memory = block(memory, n, n)

@@ -58,10 +58,8 @@ def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[Refere
 
 @glue
 def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
-    """Fill the reference point of `distribution` in the null space.
-
-    `offset`: offset of the distribution's variable (m,).
-    """
+    """Fill the reference point of `distribution` in the null space."""
+    # `offset`: offset of the distribution's variable (m,).
     from_before = distribution.method == codes.CLOSEST and not math.isnan(near.previous[0])
     for k in range(null.shape[0]):
         near.reference[k] = 0.0
@@ -137,10 +135,8 @@ def _is_tied(basis: Basis) -> bool:
 
 @kernel
 def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory) -> int:
-    """Fill `near.point` (r,) with the null-space point whose tensions have the least sum.
-
-    If several points have the least sum, the point nearest to the reference is selected.
-    """
+    """Fill `near.point` (r,) with the null-space point whose tensions have the least sum."""
+    # If several points have the least sum, the point nearest to the reference is selected.
     r, m = null.shape
     cost, memory = vector(memory, r)
     for k in range(r):
@@ -177,10 +173,8 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of `near` with the least maximum tension; of several points, the nearest to the reference.
-
-    The program's last unknown is the largest tension.
-    """
+    """Fill the point (r,) of `near` with the least maximum tension; of several points, the nearest to the reference."""
+    # The program's last unknown is the largest tension.
     r, m = null.shape
     rows, memory = block(memory, r + 1, 2 * m)
     wide, memory = block(memory, STRIP_ROWS, 2 * m)
@@ -229,10 +223,8 @@ STILL = 1e-12  # the search ends after a step below this share of the largest te
 def share_by_norm(
     p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, known: Indices, memory: Memory
 ) -> int:
-    """Fill the point (r,) of `near` whose tensions have the least p-norm.
-
-    `known`: (1,); if True, the point is the result of the previous iteration, and the search starts at this point.
-    """
+    """Fill the point (r,) of `near` whose tensions have the least p-norm."""
+    # `known`: (1,); if True, the point is the result of the previous iteration, and the search starts at this point.
     point = near.point
     slack = TOLERANCE * largest_bound(bounds)
     if known[0] > 0:
@@ -274,10 +266,8 @@ def _p_norm_power(bounds: Array, offset: Array, null: Array, point: Array, p: fl
 def _newton_target(
     bounds: Array, offset: Array, null: Array, point: Array, p: float, slope: Array, curve: Array, target: Array
 ) -> float:
-    """Fill slope, Cholesky factor of the curvature, and end point of a Newton step that ignores the limits.
-
-    Returns the largest tension [N], which is the unit of slope and curvature. A result of 0 means: no step is needed.
-    """
+    """Fill slope, Cholesky factor of the curvature, and end point of a Newton step that ignores the limits."""
+    # Returns the largest tension [N], which is the unit of slope and curvature. A result of 0 means: no step is needed.
     r, m = null.shape
     scale = 0.0
     for i in range(m):
@@ -327,13 +317,10 @@ def _change_metric(null: Array, curve: Array, target: Array, turned: Array, goal
 def _lowest_p_norm(
     first: float, p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, memory: Memory
 ) -> bool:
-    """Move the feasible point (r,) of `near` to the point of least p-norm. Returns True if this point was found.
-
-    The exponent starts small. The exponent doubles whenever the steps become short, until it is p. Each Newton
-    iteration thus starts near its solution.
-
-    The result is False if the iteration does not converge.
-    """
+    """Move the feasible point (r,) of `near` to the point of least p-norm. Returns True if this point was found."""
+    # The exponent starts small. The exponent doubles whenever the steps become short, until it is p. Each Newton
+    # iteration thus starts near its solution.
+    # The result is False if the iteration does not converge.
     r, m = null.shape
     point = near.point
     vectors, memory = block(memory, 4, r)

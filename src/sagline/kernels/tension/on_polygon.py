@@ -60,10 +60,8 @@ def most_independent(null: Array) -> tuple[int, int]:
 
 @kernel
 def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, labels: Indices) -> int:
-    """Fill corners, counter-clockwise, and labels as in `feasible_polygon`. Returns the number of corners.
-
-    The number is 0 if the polygon is empty, and -1 if the walk failed. All limits must be finite.
-    """
+    """Fill corners, counter-clockwise, and labels as in `feasible_polygon`. Returns the number of corners."""
+    # The number is 0 if the polygon is empty, and -1 if the walk failed. All limits must be finite.
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
     lines, memory = block(memory, 2 * m, 3)
@@ -190,10 +188,8 @@ def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
 
 @kernel
 def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
-    """Fill the corners of the feasible polygon, or for r = 1 the interval's ends. Returns their number, 0 if empty.
-
-    The edge of the box around the polygon replaces an infinite end of the interval, with the label of the box.
-    """
+    """Fill the corners of the feasible polygon, or for r = 1 the interval's ends. Returns their number, 0 if empty."""
+    # The edge of the box around the polygon replaces an infinite end of the interval, with the label of the box.
     if null.shape[0] == 2:
         return feasible_polygon(bounds, null, corners, labels)
     first, last = feasible_interval(bounds, null)

@@ -94,13 +94,10 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
 
 @kernel
 def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -> bool:
-    """Move a point (r,) inside the feasible set to the point with the largest product of distances to all limits.
-
-    The method takes damped Newton steps on the self-concordant barrier function and ignores infinite limits. If the set
-    is too thin to have interior points, the point does not change.
-
-    Returns True if the center was found.
-    """
+    """Move a point (r,) inside the feasible set to the point with the largest product of distances to all limits."""
+    # The method takes damped Newton steps on the self-concordant barrier function and ignores infinite limits. If the
+    # set is too thin to have interior points, the point does not change.
+    # Returns True if the center was found.
     r, m = null.shape
     vectors, memory = block(memory, 2, r)
     curve, memory = block(memory, r, r)
@@ -148,13 +145,9 @@ DEPENDENT = 1e-10
 
 @kernel
 def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, tension: Array) -> bool:
-    """Fill the tensions (m,) by the closed form, the improved closed form or the puncture method.
-
-    Returns True if the method found tensions within their limits.
-
-    Source:
-        Pott, Bruckmann & Mikelsons 2009; Pott 2014; Mueller, Reichert & Bruckmann 2015.
-    """
+    """Fill the tensions (m,) by the closed form, the improved closed form or the puncture method."""
+    # Returns True if the method found tensions within their limits.
+    # Source: Pott, Bruckmann & Mikelsons 2009; Pott 2014; Mueller, Reichert & Bruckmann 2015.
     r, m = null.shape
     slack = TOLERANCE * largest_bound(bounds)
     for i in range(m):
@@ -241,10 +234,8 @@ def distribute_by_other_method(
     work: WorkArrays,
     tension: Array,
 ) -> int:
-    """Fill the tensions (m,) in the distribution's variable minus its offset. Returns POSE_SOLVED or the failure.
-
-    Among several solutions, the solution nearest to the reference is selected.
-    """
+    """Fill the tensions (m,) in the distribution's variable minus its offset. Returns POSE_SOLVED or the failure."""
+    # Among several solutions, the solution nearest to the reference is selected.
     method, parameter = distribution.method, distribution.parameter
     status = codes.POSE_SOLVED
     if null.shape[0] == 0:

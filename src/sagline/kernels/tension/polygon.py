@@ -25,10 +25,8 @@ SPARE_CORNERS = 6  # corners in addition to two per cable: corners of the box, a
 def _cut_polygon(
     corners: Array, labels: Indices, count: int, x: float, y: float, side: float, label: int, slack: float
 ) -> int:
-    """Keep the part of the polygon where (x, y) . corner >= `side`. Returns the number of remaining corners.
-
-    The corners change in place. The border of a half-plane crosses the border of a convex polygon at most twice.
-    """
+    """Keep the part of the polygon where (x, y) . corner >= `side`. Returns the number of remaining corners."""
+    # The corners change in place. The border of a half-plane crosses the border of a convex polygon at most twice.
     leaving = -1  # last corner inside the half-plane, before the first corner outside
     entering = -1  # first corner inside the half-plane, after the last corner outside
     kept = 0
@@ -84,10 +82,8 @@ def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, en
 
 @glue
 def widest_pair(null: Array) -> tuple[int, int, float]:
-    """Two cables whose rows span a large parallelogram, and the signed area of the parallelogram.
-
-    The first cable has the longest row. The second cable gives the largest area together with the first cable.
-    """
+    """Two cables whose rows span a large parallelogram, and the signed area of the parallelogram."""
+    # The first cable has the longest row. The second cable gives the largest area together with the first cable.
     m = null.shape[1]
     first = second = 0
     longest = 0.0
@@ -105,10 +101,8 @@ def widest_pair(null: Array) -> tuple[int, int, float]:
 
 @glue
 def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, labels: Indices) -> tuple[int, int]:
-    """Fill the four corners of the intersection of two bounds. A box replaces an infinite limit.
-
-    Returns the two bounds.
-    """
+    """Fill the four corners of the intersection of two bounds. A box replaces an infinite limit."""
+    # Returns the two bounds.
     m = null.shape[1]
     a, b, area = widest_pair(null)
     for k in range(4):
@@ -132,10 +126,8 @@ def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, la
 
 @kernel
 def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
-    """Fill corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon. Returns the number of corners.
-
-    `bounds`: minimum-norm tensions and limits (3, m). `null`: orthonormal basis, one vector per row, (2, m).
-    """
+    """Fill corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon. Returns the number of corners."""
+    # `bounds`: minimum-norm tensions and limits (3, m). `null`: orthonormal basis, one vector per row, (2, m).
     m = null.shape[1]
     largest = largest_bound(bounds)
     slack = TOLERANCE * largest
@@ -165,10 +157,8 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
-    """Fill the corners of the feasible polygon from its known sides. False if the polygon has other sides.
-
-    The known sides are correct if they have the same order around the new polygon, and if no limit excludes a corner.
-    """
+    """Fill the corners of the feasible polygon from its known sides. False if the polygon has other sides."""
+    # The known sides are correct if they have the same order around the new polygon, and if no limit excludes a corner.
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
     for k in range(count):

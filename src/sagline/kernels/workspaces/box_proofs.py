@@ -65,10 +65,8 @@ def proves_inside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if the tensions tau + J^+ z are within the limits at all poses of `box`; z is the change of the demand.
-
-    centered.give is filled with the change of each tension due to the set of wrenches [N].
-    """
+    """True if the tensions tau + J^+ z are within the limits at all poses of `box`; z is the change of the demand."""
+    # centered.give is filled with the change of each tension due to the set of wrenches [N].
     n, m = place.matrix.shape
     room, memory = _new_tension_box(memory, m, n)
     slopes, memory = block(memory, MOTIONS + 2, 6)
@@ -168,11 +166,9 @@ def _fill_changes(
     change: Array,
     hanging: Array,
 ) -> float:
-    """Fill how a tension changes per newton of all tensions and sag forces. Returns its change by bends [N].
-
-    `along`: row of the pseudo-inverse as a direction of wrenches, (6,). `inexact`: error of the pseudo-inverse, per
-    newton. `bends_weight`: `Precision.bends`.
-    """
+    """Fill how a tension changes per newton of all tensions and sag forces. Returns its change by bends [N]."""
+    # `along`: row of the pseudo-inverse as a direction of wrenches, (6,). `inexact`: error of the pseudo-inverse, per
+    # newton. `bends_weight`: `Precision.bends`.
     arm = norm3(along[3], along[4], along[5])
     bends = 0.0
     for j in range(tau.size):
@@ -231,11 +227,9 @@ def proves_outside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if a direction y, which depends on the pose, separates demand and available wrenches in a box of poses.
-
-    The direction is the residual of the centered tensions, with its derivatives with respect to the pose. The direction
-    is slightly corrected, so that the cables between their limits contribute zero or less.
-    """
+    """True if a direction y, which depends on the pose, separates demand and available wrenches in a box of poses."""
+    # The direction is the residual of the centered tensions, with its derivatives with respect to the pose. The
+    # direction is slightly corrected, so that the cables between their limits contribute zero or less.
     n, m = place.matrix.shape
     wide, memory = block(memory, 8, m)
     turns, memory = block(memory, MOTIONS, n)
@@ -346,12 +340,10 @@ def _moment_turned(place: CablesInBox, i: int, direction: Array, motion: int) ->
 
 @kernel
 def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, turning: Array, rows: Array) -> None:
-    """Fill the contributions along a direction, per newton of tension and of sag force, and their changes in a box.
-
-    `direction`: y at the middle, (6,). `turning`: derivatives of y with respect to each motion, (MOTIONS, 6). `rows`:
-    filled for tensions, then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the
-    largest deviation from the linear change (BENT).
-    """
+    """Fill the contributions along a direction, per newton of tension and of sag force, and their changes in a box."""
+    # `direction`: y at the middle, (6,). `turning`: derivatives of y with respect to each motion, (MOTIONS, 6). `rows`:
+    # filled for tensions, then for sag forces, with the value at the middle, the largest linear change (SPREAD), and
+    # the largest deviation from the linear change (BENT).
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3
     arm = norm3(direction[3], direction[4], direction[5])

@@ -102,11 +102,9 @@ def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> boo
 
 @kernel
 def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
-    """Move the tensions to the smoothed center. Returns the square of the remaining residual [N^2].
-
-    `matrix`: structure matrix, all rows in newtons, (n, m). `smoothing`: [N^2], > 0. `centered`: contains limits and
-    right side; the other fields are filled.
-    """
+    """Move the tensions to the smoothed center. Returns the square of the remaining residual [N^2]."""
+    # `matrix`: structure matrix, all rows in newtons, (n, m). `smoothing`: [N^2], > 0. `centered`: contains limits and
+    # right side; the other fields are filled.
     n, m = matrix.shape
     tau, low, high, below, above = centered.tau, centered.low, centered.high, centered.below, centered.above
     _start_centering(matrix, smoothing, centered)
@@ -187,10 +185,8 @@ class Ranges(NamedTuple):
 
 @kernel
 def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges) -> None:
-    """Fill the admissible tensions of all poses of a box from the admissible tensions at its middle.
-
-    The smallest tension that the limit of the sag admits increases with the length of the chord.
-    """
+    """Fill the admissible tensions of all poses of a box from the admissible tensions at its middle."""
+    # The smallest tension that the limit of the sag admits increases with the length of the chord.
     cables = curves.cables
     for i in range(place.way.size):
         low, high = cables.low[i], cables.high[i]
@@ -208,13 +204,11 @@ def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges
 
 @kernel
 def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> None:
-    """Widen or narrow the chord limits by the largest change of the limits from the middle to any pose of the box.
-
-    If a cable is not slack, a limit changes at most as fast as the sag force. If a cable may be slack at a limit
-    somewhere in the box, this limit is replaced: in proofs of feasibility by the smallest chord tension at which the
-    cable is not slack, and in proofs of infeasibility by 0 N. If a cable has no admissible tension at the middle, it
-    is slack at any admissible tension elsewhere in the box.
-    """
+    """Widen or narrow the chord limits by the largest change of the limits from the middle to any pose of the box."""
+    # If a cable is not slack, a limit changes at most as fast as the sag force. If a cable may be slack at a limit
+    # somewhere in the box, this limit is replaced: in proofs of feasibility by the smallest chord tension at which the
+    # cable is not slack, and in proofs of infeasibility by 0 N. If a cable has no admissible tension at the middle, it
+    # is slack at any admissible tension elsewhere in the box.
     cables = curves.cables
     way = place.way[i]
     tight = cables.half_weight[i] * (1.0 + way / cables.chord[i]) / SLACK
@@ -229,14 +223,11 @@ def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> 
 
 @kernel
 def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, ranges: Ranges) -> None:
-    """If all cables pull upward, reduce the largest tensions to the values that the load can cause.
-
-    The vertical parts of all tensions balance weight, load and sag forces. The vertical part of one tension is
-    therefore at most this load minus the smallest vertical parts of the other tensions.
-
-    `freedom`: rows that select the free motions, (n, 6). `upward`: largest vertical force that the cables must supply,
-    without sag forces [N].
-    """
+    """If all cables pull upward, reduce the largest tensions to the values that the load can cause."""
+    # The vertical parts of all tensions balance weight, load and sag forces. The vertical part of one tension is
+    # therefore at most this load minus the smallest vertical parts of the other tensions.
+    # `freedom`: rows that select the free motions, (n, 6). `upward`: largest vertical force that the cables must
+    # supply, without sag forces [N].
     free = 0.0
     for k in range(freedom.shape[0]):
         free += freedom[k, 2] * freedom[k, 2]
@@ -288,10 +279,8 @@ def in_wrench_space(rows: Array, vector: Array, full: Array) -> None:
 def _fill_demand(
     curves: Curves, place: CablesInBox, center: Array, load: Array, centered: Centered, ranges: Ranges
 ) -> None:
-    """Fill the demand on the chord tensions, with the sag forces at the present tensions.
-
-    `load`: wrench, (6,). `centered`: its demand is filled. `ranges`: its sag forces are filled.
-    """
+    """Fill the demand on the chord tensions, with the sag forces at the present tensions."""
+    # `load`: wrench, (6,). `centered`: its demand is filled. `ranges`: its sag forces are filled.
     n, m = place.matrix.shape
     sag_forces_at(curves, centered.tau, ranges.sag_force)
     z = center[tables.MASS] * center[tables.GRAVITY] - load[2]
@@ -319,10 +308,8 @@ def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
 
 @glue
 def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered) -> bool:
-    """Fill the limits of the search for tensions: the limits of the box, narrowed by `taken` (m,) at both ends.
-
-    Returns False if a lower limit exceeds the upper limit.
-    """
+    """Fill the limits of the search for tensions: the limits of the box, narrowed by `taken` (m,) at both ends."""
+    # Returns False if a lower limit exceeds the upper limit.
     possible = True
     for i in range(taken.size):
         low = ranges.low[i]
@@ -338,10 +325,8 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
 def center_tensions(
     place: CablesInBox, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
 ) -> bool:
-    """Compute centered tensions within the limits of the search, and their sag forces, for `wrench` (6,).
-
-    Returns True if the residual is so large that the demand is infeasible.
-    """
+    """Compute centered tensions within the limits of the search, and their sag forces, for `wrench` (6,)."""
+    # Returns True if the residual is so large that the demand is infeasible.
     iterations = ITERATIONS if curves.model.code == codes.CATENARY else 1
     smoothing = 0.0
     for i in range(centered.tau.size):

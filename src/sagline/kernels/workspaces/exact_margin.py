@@ -64,10 +64,8 @@ def settle_margin(
     margin: Array,
     memory: Memory,
 ) -> int:
-    """Replace `margin` (3,) by the margin with exact sag forces. Returns the status of the new margin.
-
-    `platform`: contains the least favorable wrench of the set.
-    """
+    """Replace `margin` (3,) by the margin with exact sag forces. Returns the status of the new margin."""
+    # `platform`: contains the least favorable wrench of the set.
     cables = curves.cables
     m, n = cables.low.size, platform.freedom.shape[0]
     load, rest = vector(memory, n)
@@ -141,10 +139,8 @@ def _distributes_tensions(
 
 @glue
 def _write_value(margin: Array, exact: float, error: float) -> None:
-    """Fill value and bounds of `margin` from `exact`, the margin with exact sag forces [N].
-
-    The value has the sign of the exact margin. The value is continuous where the bounds begin to decide the sign.
-    """
+    """Fill value and bounds of `margin` from `exact`, the margin with exact sag forces [N]."""
+    # The value has the sign of the exact margin. The value is continuous where the bounds begin to decide the sign.
     share = 0.0
     if exact > 0.0:
         share = max(1.0 + margin[BELOW] / exact, 0.0)
@@ -236,14 +232,11 @@ def _fill_load(freedom: Array, facet: LimitingFacet, load: Array) -> None:
 def _largest_multiple(
     curves: Curves, demand: Demand, bands: Array, load: Array, above: float, tau: Array, memory: Memory
 ) -> float:
-    """Largest multiple of `load` that the cables supply in addition to `demand`. Infinite or NaN if not found.
-
-    A reflection turns the load to the first component. Only this component is soft. The searches start at `above`,
-    beyond the upper bound: from `tau`, from equal high tensions, and from the best tensions with one cable at its lower
-    limit. The first multiple that is certainly positive ends the search.
-
-    `tau`: overwritten with the tensions that supply the multiple.
-    """
+    """Largest multiple of `load` that the cables supply in addition to `demand`. Infinite or NaN if not found."""
+    # A reflection turns the load to the first component. Only this component is soft. The searches start at `above`,
+    # beyond the upper bound: from `tau`, from equal high tensions, and from the best tensions with one cable at its
+    # lower limit. The first multiple that is certainly positive ends the search.
+    # `tau`: overwritten with the tensions that supply the multiple.
     n, m = demand.matrix.shape
     rows, rest = block(memory, 2 * n + 4, m)
     vectors, rest = block(rest, 4, n)

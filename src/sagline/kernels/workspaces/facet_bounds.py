@@ -140,11 +140,9 @@ def _force_of_column(rows: Array, i: int, arm: float) -> float:
 
 @kernel
 def measure_bounds(minors: Array, rows: int, members: int, count: int, limit: float, bounds: Bounds) -> None:
-    """Fill the excess of the bounds over `limit` for the facets of `rows`, a set of `members`, and each subset.
-
-    The coefficients of a normal bound its length: it is at most their sum with the lengths of the rows, and at least
-    their sum divided by the sum of the norms of the columns.
-    """
+    """Fill the excess of the bounds over `limit` for the facets of `rows`, a set of `members`, and each subset."""
+    # The coefficients of a normal bound its length: it is at most their sum with the lengths of the rows, and at least
+    # their sum divided by the sum of the norms of the columns.
     terms, excess = bounds.terms, bounds.excess
     excess[:count] = 0.0
     forces = 0.0

@@ -87,10 +87,8 @@ def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
 
 @glue
 def choose_basis(facets: Facets, n: int, m: int, lever: float, full: bool) -> bool:
-    """Eliminate in place, and fill the columns and the minors of single columns. False if the rank is not full.
-
-    If not `full`, only the rank is found, with pivots from one row at a time.
-    """
+    """Eliminate in place, and fill the columns and the minors of single columns. False if the rank is not full."""
+    # If not `full`, only the rank is found, with pivots from one row at a time.
     table, basis = facets.table, facets.basis
     width = m + 7 if full else m
     first = 0.0
@@ -157,10 +155,8 @@ def _subtract_row(row: Array, factor: float, other: Array) -> None:
 
 @glue
 def next_subsets(facets: Facets, n: int, size: int) -> tuple[int, int]:
-    """Advance to the next subsets of the other columns, and fill their minors. Returns their size and their number.
-
-    size: size of the present subsets; the first subset is empty. The size after the last subsets is -1.
-    """
+    """Advance to the next subsets of the other columns, and fill their minors. Returns their size and their number."""
+    # size: size of the present subsets; the first subset is empty. The size after the last subsets is -1.
     chosen, r = facets.chosen, facets.others.shape[0]
     if size < min(AT_ONCE, n - 1, r):
         size += 1

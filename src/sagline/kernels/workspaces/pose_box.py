@@ -59,12 +59,10 @@ def new_cables_in_box(memory: Memory, m: int, n: int) -> tuple[CablesInBox, Memo
 def set_cables_in_box(
     freedom: Array, geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox
 ) -> bool:
-    """Fill `place` from the geometry of the cables. False if a platform end may meet its frame end in the box.
-
-    `freedom`: rows that select the free motions, (n, 6). `geometry`: rows of `cable_geometry` at the middle,
-    (GEOMETRY_ROWS, m). `rotation`: platform -> world at the middle, (3, 3). `center`: center of mass in the platform
-    frame [m], (3,). `place`: filled.
-    """
+    """Fill `place` from the geometry of the cables. False if a platform end may meet its frame end in the box."""
+    # `freedom`: rows that select the free motions, (n, 6). `geometry`: rows of `cable_geometry` at the middle,
+    # (GEOMETRY_ROWS, m). `rotation`: platform -> world at the middle, (3, 3). `center`: center of mass in the platform
+    # frame [m], (3,). `place`: filled.
     n, m = place.matrix.shape
     fill_structure_matrix(geometry, place.full)
     mean = 0.0

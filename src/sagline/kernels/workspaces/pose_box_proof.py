@@ -50,19 +50,16 @@ def prove_boxes(
     memory: tuple[Array, Indices],
     answers: tuple[Codes, Codes],
 ) -> None:
-    """Try to prove for each of N boxes that all its poses are wrench-feasible, or that all are infeasible.
-
-    Args:
-        model_terms: Cable model: code, k_h, k_p.
-        limit_terms: Limits of the tensions: `TensionLimits`.
-        robot_terms: Rows that select the free motions, (n, 6); body_table (1, BODY_COLUMNS); cable_table, (1, m,
-            CABLE_COLUMNS), of a robot without pulleys.
-        load_terms: The wrenches to balance: `Loads`.
-        boxes: Rows: pose at the middle, half edges [m], largest rotation from the middle [rad], (N, BOX_COLUMNS).
-        precision_terms: `Precision`.
-        memory: `proof_memory` for the number of cables.
-        answers: Filled with OPEN, INSIDE or OUTSIDE, (N,); and a work array of statuses, (m,).
-    """
+    """Try to prove for each of N boxes that all its poses are wrench-feasible, or that all are infeasible."""
+    # model_terms: Cable model: code, k_h, k_p.
+    # limit_terms: Limits of the tensions: `TensionLimits`.
+    # robot_terms: Rows that select the free motions, (n, 6); body_table (1, BODY_COLUMNS); cable_table, (1, m,
+    #   CABLE_COLUMNS), of a robot without pulleys.
+    # load_terms: The wrenches to balance: `Loads`.
+    # boxes: Rows: pose at the middle, half edges [m], largest rotation from the middle [rad], (N, BOX_COLUMNS).
+    # precision_terms: `Precision`.
+    # memory: `proof_memory` for the number of cables.
+    # answers: Filled with OPEN, INSIDE or OUTSIDE, (N,); and a work array of statuses, (m,).
     limits, loads, precision = TensionLimits(*limit_terms), Loads(*load_terms), Precision(*precision_terms)
     freedom, bodies, robots = robot_terms
     verdicts, statuses = answers
@@ -125,10 +122,8 @@ def _tighten_by_load(
     direction: Array,
     ranges: box_tensions.Ranges,
 ) -> float:
-    """Reduce the largest tensions to the values that the load can cause. Returns the sum of all forces [N].
-
-    `direction` (6,) is overwritten.
-    """
+    """Reduce the largest tensions to the values that the load can cause. Returns the sum of all forces [N]."""
+    # `direction` (6,) is overwritten.
     direction[:] = 0.0
     direction[2] = 1.0
     upward = body[tables.MASS] * body[tables.GRAVITY] - loads.center[2] + reach_of_loads(loads, direction)

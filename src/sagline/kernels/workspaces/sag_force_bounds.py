@@ -102,11 +102,9 @@ def has_sag(curves: Curves, i: int) -> bool:
 
 @kernel
 def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float:
-    """Largest derivative [N/m] of a sag force by the position of the platform end, at all tensions >= `tension`.
-
-    `way`: largest distance of the platform end from its position in `curves` [m]. `tension`: lower bound of the chord
-    tension [N].
-    """
+    """Largest derivative [N/m] of a sag force by the position of the platform end, at all tensions >= `tension`."""
+    # `way`: largest distance of the platform end from its position in `curves` [m]. `tension`: lower bound of the chord
+    # tension [N].
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
         return abs(cables.sag_force[i]) / cables.chord[i]

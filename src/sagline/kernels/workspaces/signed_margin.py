@@ -104,23 +104,20 @@ def signed_margins(
     first: int,
     last: int,
 ) -> None:
-    """Fill the margins of poses.
-
-    Args:
-        model_terms: Cable model: code, k_h, k_p.
-        limit_terms: Limits of the tensions: `TensionLimits`.
-        robot_terms: Rows that select the free motions, translations first, (n, 6); body_table, (1 or R, BODY_COLUMNS);
-            cable_table, (1 or R, m, CABLE_COLUMNS). N/R successive poses belong to each robot.
-        set_terms: The set of loads.
-        arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
-        poses: Rows (N, POSE_COLUMNS).
-        memory: Two times the work arrays from `memory_for`, `margin_memory` numbers, and codes of the cables (m,).
-        margins: Filled with value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in
-            world axes, of length 1 with moments divided by the lever arm, (N, 6); index of the cable whose limit has
-            the largest effect on the value, or -1, (N,); status from the two bounds, (N,).
-        first: Index of the first pose.
-        last: Index after the last pose.
-    """
+    """Fill the margins of poses."""
+    # model_terms: Cable model: code, k_h, k_p.
+    # limit_terms: Limits of the tensions: `TensionLimits`.
+    # robot_terms: Rows that select the free motions, translations first, (n, 6); body_table, (1 or R, BODY_COLUMNS);
+    #   cable_table, (1 or R, m, CABLE_COLUMNS). N/R successive poses belong to each robot.
+    # set_terms: The set of loads.
+    # arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
+    # poses: Rows (N, POSE_COLUMNS).
+    # memory: Two times the work arrays from `memory_for`, `margin_memory` numbers, and codes of the cables (m,).
+    # margins: Filled with value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in
+    #   world axes, of length 1 with moments divided by the lever arm, (N, 6); index of the cable whose limit has the
+    #   largest effect on the value, or -1, (N,); status from the two bounds, (N,).
+    # first: Index of the first pose.
+    # last: Index after the last pose.
     limits = TensionLimits(*limit_terms)
     freedom, bodies, robots = robot_terms
     values, directions, limiting, statuses = margins
@@ -207,10 +204,8 @@ def _fill_facet_table(freedom: Array, full: Array, lever: float, table: Array) -
 def _fill_weights(
     body: Array, center: Array, geometry: Array, bands: Array, rows: Array, middle: Array
 ) -> tuple[bool, bool]:
-    """Fill the weights of the cables for all facets.
-
-    Returns True if a cable has no upper limit, and True if a sag force differs from its secant.
-    """
+    """Fill the weights of the cables for all facets."""
+    # Returns True if a cable has no upper limit, and True if a sag force differs from its secant.
     endless = curved = False
     for a in range(6):
         middle[a] = center[a]
@@ -249,10 +244,8 @@ def _measure_all_facets(
     margin: Array,
     direction: Array,
 ) -> None:
-    """Fill the margin over all facets (3,), and the normal of the facet with the least value (6,).
-
-    As soon as the first facets are measured, bounds exclude most of the others.
-    """
+    """Fill the margin over all facets (3,), and the normal of the facet with the least value (6,)."""
+    # As soon as the first facets are measured, bounds exclude most of the others.
     margin[:] = math.inf
     facets.minors[0, 0] = 1.0
     n, size, count, c, held = facets.basis.size, 0, 1, 0, 0

@@ -130,10 +130,8 @@ def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wre
 def reach_of_set(
     wrenches: WrenchSetArrays, normals: Array, count: int, work: Array, against: Array, along: Array
 ) -> None:
-    """Fill the largest -y . w and the largest y . w [N] of the set for the first `count` normals y.
-
-    `normals`: y, (6, B). `work`: work array, (2, B). `against`: filled, (B,). `along`: filled, (B,).
-    """
+    """Fill the largest -y . w and the largest y . w [N] of the set for the first `count` normals y."""
+    # `normals`: y, (6, B). `work`: work array, (2, B). `against`: filled, (B,). `along`: filled, (B,).
     against[:count] = 0.0
     _add_segments(wrenches.own, normals, count, work[0], against)
     _add_segments(wrenches.segments, normals, count, work[0], against)
