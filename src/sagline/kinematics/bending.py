@@ -99,8 +99,8 @@ def bending_cycles(plan: Plan, elements: int = 500) -> BendingCycles:
                 continue
             beyond = np.searchsorted(position, end[:, i], side="right")  # first element beyond the end, (N,)
             first, last = np.minimum(beyond[1:], beyond[:-1]), np.maximum(beyond[1:], beyond[:-1])
-            for step in np.flatnonzero(first < last):  # elements that pass the end
-                part = slice(first[step], last[step])
+            for k in np.flatnonzero(first < last):
+                part = slice(first[k], last[k])  # elements that pass the end
                 counts[which, part, i] += 0.5
-                largest[part, i] = np.maximum(largest[part, i], tension[step, i])
+                largest[part, i] = np.maximum(largest[part, i], tension[k, i])
     return BendingCycles(plan, locked(position), locked(counts[0]), locked(counts[1]), locked(largest))
