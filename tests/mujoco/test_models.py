@@ -150,6 +150,8 @@ def test_wrong_numbers_in_a_file_are_refused(case: str, tmp_path: Path, monkeypa
 def test_a_body_is_needed_that_the_model_has() -> None:
     with refused("body", "'load'", "a body of the model: one, two"):
         sl.mujoco.attach(two_bodies(), MIXED, body="load")
+    with refused("body", "'world'", "a body of the model: one, two"):
+        sl.mujoco.attach(two_bodies(), MIXED, body="world")
     with refused("body", "'load'", "a body of the model: none has a name"):
         sl.mujoco.attach(mujoco.MjSpec.from_string(EMPTY), MIXED, body="load")
 

@@ -30,7 +30,7 @@ const poses = {poses}, found = poses.map((pose) => {{
   return {{ plan, rest: robot.forward(plan.length, pose) }};
 }});
 """
-# arguments of `inverse` and `forward`, and the words of the message
+# arguments of the functions, and the words of the message
 WRONG = {
     "robot.inverse({ quaternion: [0, 0, 0, 1] })": "position is undefined; allowed: 3 numbers",
     "robot.inverse({ position: [0, 0], quaternion: [0, 0, 0, 1] })": "position is 0, 0; allowed: 3 numbers",
@@ -43,6 +43,12 @@ WRONG = {
     "robot.forward([1, 2, 3, 4, 5, 6, 7, 0], pose)": "allowed: 8 numbers, > 0 m",
     "robot.forward([1, 2, 3, 4, 5, 6, 7, Infinity], pose)": "allowed: 8 numbers, > 0 m",
     "robot.forward(null, pose)": "length is null; allowed: 8 numbers",
+    "robot.courses({ position: [0, 0] }, tension)": "position is 0, 0; allowed: 3 numbers",
+    "robot.courses({ position: [0, 0, 1], quaternion: [0, 0, 0, 2] }, tension)": "quaternion is 0, 0, 0, 2; allowed: 4",
+    "robot.courses(pose, [1, 2])": "tension is 1, 2; allowed: 8 numbers, >= 0 N or NaN",
+    "robot.courses(pose, tension.with(3, -1))": "allowed: 8 numbers, >= 0 N or NaN",
+    "robot.courses(pose, tension.with(3, Infinity))": "allowed: 8 numbers, >= 0 N or NaN",
+    "robot.courses(pose, null)": "tension is null; allowed: 8 numbers",
     "await sagline.robot({})": "sagline convert ROBOT --kind javascript",
     "await sagline.robot('5')": "sagline convert ROBOT --kind javascript",
     "await sagline.robot({ ...machine, module: 1 })": "the robot is for another kernels.wasm",
@@ -122,7 +128,7 @@ def test_wrong_arguments_are_refused_in_one_line(package: Path) -> None:
     text = f"""
 import {{ load }} from "./package/sagline.mjs";
 const machine = {data}, sagline = await load(), robot = await sagline.robot(machine);
-const pose = {{ position: [0, 0, 1.5], quaternion: [0, 0, 0, 1] }}, found = [];
+const pose = {{ position: [0, 0, 1.5], quaternion: [0, 0, 0, 1] }}, tension = [...Array(8)].map(() => NaN), found = [];
 const told = (error) => `${{error.name}}: ${{error.message}}`;
 for (const call of [{calls}]) found.push(await call().then(() => "accepted", told));
 console.log(JSON.stringify(found));
@@ -132,6 +138,27 @@ console.log(JSON.stringify(found));
         assert message.startswith(("RangeError: ", "TypeError: ")), f"{call}: {message}"
         assert WRONG[call] in message, f"{call}: {message}"
         assert "\n" not in message
+
+
+@extended
+def test_without_an_equilibrium_there_are_no_numbers(package: Path, robot: sl.Robot) -> None:
+    data = (package.parent / "robot.json").read_text(encoding="utf-8")
+    at, short = sl.Pose((0.0, 0.0, 1.5), np.eye(3)), np.full(8, 1e-3)  # m, of cables that cannot reach
+    strained = sl.inverse(robot, at).unstrained_length * 0.9
+    given = json.dumps([short.tolist(), strained.tolist()])
+    text = f"""
+import {{ load }} from "./package/sagline.mjs";
+const robot = await (await load()).robot({data}), pose = {{ position: [0, 0, 1.5], quaternion: [0, 0, 0, 1] }};
+console.log(JSON.stringify({given}.map((length) => robot.forward(length, pose))));
+"""
+    lost, found = in_node(text, package.parent)
+    assert sl.forward(robot, short, at).status == lost["status"] == sl.ForwardStatus.NOT_CONVERGED
+    assert not lost["solved"]
+    assert [lost[name] for name in ("position", "quaternion", "tension")] == [None, None, None]
+    rest = sl.forward(robot, strained, at)
+    assert found["status"] == rest.status
+    np.testing.assert_allclose(found["position"], rest.pose.position, rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(found["tension"], rest.state.chord_tension, rtol=1e-9)
 
 
 class _Quiet(SimpleHTTPRequestHandler):

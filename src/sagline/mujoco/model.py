@@ -85,7 +85,7 @@ def attach(
     names = _names(robot, label(prefix, "prefix") if prefix != "" else "")
     losses = _losses(damping)
     platform = spec.body(label(body, "body"))
-    if platform is None:
+    if platform is None or body == "world":  # which does not move
         bodies = ", ".join(each.name for each in spec.bodies[1:] if each.name)
         raise InvalidValueError(
             "body", brief(body), f"a body of the model: {bodies or 'none has a name'}", "Correct it."

@@ -85,6 +85,7 @@ def model_data(robot: Robot) -> dict[str, Any]:
         "statuses": {each.value: each.text.partition(";")[0] for each in PoseStatus},
         "rests": {each.value: each.text.partition(";")[0] for each in ForwardStatus},
         "undecided": list(UNDECIDED),
+        "lost": [ForwardStatus.NOT_CONVERGED.value, ForwardStatus.NO_LENGTHS.value],
         "chordless": PoseStatus.NO_CHORD.value,
         "infeasible": PoseStatus.INFEASIBLE.value,
         "freedom": json_numbers(robot.freedom),

@@ -89,7 +89,7 @@ const sagline = (() => {
       return { ...none, short, blocking: where(each(of.blocking)) };
     }
 
-    /** The equilibrium of a platform on cables of given lengths [m], from a pose close by; chord tensions [N]. */
+    /** The equilibrium of a platform on cables of given lengths [m], from a pose close by; chord tensions [N]. Null if none is found. */
     function forward(length, pose) {
       const given = numbers(length, "length", cables, "> 0 m", (one) => one > 0 && one <= FARTHEST);
       place(pose);
@@ -97,13 +97,15 @@ const sagline = (() => {
       of.forward();
       const [x, y, z, ...quaternion] = of.rest, status = of.restStatus[0];
       const found = { solved: status === 0, status, reason: machine.rests[status] };
+      if (machine.lost.includes(status)) return { ...found, position: null, quaternion: null, tension: null };
       return { ...found, position: [x, y, z], quaternion, tension: each(of.restTension) };
     }
 
     /** Points of each cable [m] at chord tensions [N], from frame anchor over pulley to platform end; straight where NaN. */
-    function courses({ position, quaternion }, tension) {
-      of.pose.set([...position, ...quaternion]);
-      of.drawn.set(tension);
+    function courses(pose, tension) {
+      const drawn = numbers(tension, "tension", cables, ">= 0 N or NaN", (one) => (one >= 0 && one < Infinity) || Number.isNaN(one));
+      place(pose);
+      of.drawn.set(drawn);
       of.draw();
       const { points } = of, count = points.length / (3 * cables);
       return Array.from({ length: cables }, (_, i) => Array.from({ length: count }, (_, k) => {

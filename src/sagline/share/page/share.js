@@ -31,6 +31,7 @@ const share = (() => {
   function wound(planned, cable, more) {
     const length = planned.length.map((each, i) => (i === cable ? each + more : each));
     const { solved, reason, position, quaternion, tension } = machine.forward(length, planned.pose);
+    if (!position) return moment(planned.pose, length.map(() => NaN), { length, verdict: { good: false, words: `Not held: ${reason}` } });
     const way = 1e3 * Math.hypot(...robot.plus(position, -1, planned.pose.position));
     const words = solved ? `At rest ${written(way, 1)} mm from the planned pose` : `Not held: ${reason}`;
     return moment(robot.posed(position, quaternion), tension, { length, verdict: { good: solved ? null : false, words } });
