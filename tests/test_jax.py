@@ -98,10 +98,10 @@ def test_batches_of_some_arguments_agree_with_single_calls() -> None:
 
 
 def test_poses_without_a_solution_are_nan() -> None:
-    far = sj.Forward(np.array([30.0, 0.0, 1.0]), POSE.quaternion, None)
-    assert np.isnan(np.concatenate(sj.inverse(COGIRO, far))).all()
-    broken = sj.forward(COGIRO, np.full(8, np.nan), POSE)
-    assert np.isnan(np.concatenate(broken)).all()
+    far = sj.Forward(np.array([30.0, 0.0, 1.0]), np.array(POSE.quaternion), np.zeros(8))
+    infeasible = jax.jit(lambda place: sj.inverse(COGIRO, place))(far)
+    broken = jax.jit(lambda lengths: sj.forward(COGIRO, lengths, POSE))(np.full(8, np.nan))
+    assert np.isnan(np.concatenate((*infeasible, *broken))).all()
 
 
 def test_slopes_have_a_kink_where_a_limit_becomes_active() -> None:
