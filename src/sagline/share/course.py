@@ -94,20 +94,13 @@ class SharedMotion:
         """Samples of a log of the controller. Poses are planned poses, or estimated poses of cycles without a plan."""
         from sagline.viewer.session import WRONG
 
-        planned = np.isfinite(session.planned).all(axis=1, keepdims=True)
-        row = np.maximum(session.shown, 0)
-        position = np.where(planned, session.planned, session.position[row])
-        quaternion = np.where(planned, session.planned_quaternion, session.quaternion[row])
         codes, which = np.unique(session.state, return_inverse=True)
         states = [State(int(code)) for code in codes]
         verdicts = tuple((False if state in WRONG else None, f"Controller: {state.name}") for state in states)
-        unknown = ~np.isfinite(position).all(axis=1)
-        if unknown.any():  # no earlier pose is known
-            somewhere = session.pose_at(int(np.argmax(unknown)))
-            position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
-        drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)
+        pose = session.poses
+        drawn = chord_tension(session.robot, pose, session.length)
         return cls(
-            session.robot, "log", session.time, position, quaternion, session.tension, "measured", drawn,
+            session.robot, "log", session.time, pose.position, pose.quaternion, session.tension, "measured", drawn,
             session.length, which.astype(np.intp), verdicts,
         )  # fmt: skip
 

@@ -52,27 +52,25 @@ class PlayedLog(Played):
     length: Array  # lengths from the encoders, with the zeros of homing [m], shape (N, m)
     set_length: Array  # set points of the lengths [m], shape (N, m)
     events: tuple[Event, ...]
-    shown: Array = field(init=False)  # index of the last cycle with a known position up to each cycle, or of the first
+    # planned poses; without a plan, the estimated pose, or the last known pose
+    poses: Pose = field(init=False)
 
     name = "log"
     unchanged = "A log keeps its robot and loads; drag the platform to change them."
 
     def __post_init__(self) -> None:
-        """Determine, for each cycle with an unknown position, the cycle whose position is shown instead."""
-        known = np.flatnonzero(np.isfinite(self.position[:, 0]))
-        last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
-        rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
-        object.__setattr__(self, "shown", rows)
-
-    def pose_at(self, index: int) -> Pose:
-        """Planned pose of the cycle `index`. Without a plan, its estimated pose, or the last known pose."""
-        if np.isfinite(self.planned[index]).all():
-            return Pose.from_quaternion(self.planned[index], self.planned_quaternion[index])
-        row = int(self.shown[index])
-        if row >= 0:
-            return Pose.from_quaternion(self.position[row], self.quaternion[row])
+        """Determine the poses of all cycles."""
+        rows = np.arange(len(self.time))
+        if (known := np.flatnonzero(np.isfinite(self.position[:, 0]))).size:
+            rows = known[np.maximum(np.searchsorted(known, rows, side="right") - 1, 0)]
+        planned = np.isfinite(self.planned).all(axis=1, keepdims=True)
+        position = np.where(planned, self.planned, self.position[rows])
+        quaternion = np.where(planned, self.planned_quaternion, self.quaternion[rows])
+        unknown = ~np.isfinite(position).all(axis=1)
         box, anchors = self.robot.test_box, self.robot.frame_anchors
-        return Pose(anchors.mean(axis=0) if box is None else 0.5 * (box.low + box.high), np.eye(3))
+        position[unknown] = anchors.mean(axis=0) if box is None else 0.5 * (box.low + box.high)
+        quaternion[unknown] = [0.0, 0.0, 0.0, 1.0]
+        object.__setattr__(self, "poses", Pose.from_quaternion(position, quaternion))
 
     def at(self, time: float) -> InMotion:
         """The cycle at or before a time [s]."""
@@ -100,7 +98,7 @@ class PlayedLog(Played):
         feasible = state not in WRONG
         text = definitions((name, escape(text)) for name, text in rows)
         verdict = verdict_box("quiet" if feasible else "bad", state.name, text)
-        here, length, notice = self.pose_at(k), np.asarray(self.length[k]), "" if feasible else state.name
+        here, length, notice = self.poses[k], np.asarray(self.length[k]), "" if feasible else state.name
         table = (heads, columns, NO_CHOICE)
         return InMotion(self.robot, here, k, tension, length, verdict, *table, feasible, rest, truth, notice=notice)
 
