@@ -9,6 +9,7 @@ import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.output import file_of, is_file
 from sagline.cli.terminal import show_text, working
+from sagline.core.errors import needed_packages
 from sagline.files.writing import check_file, create_folder, file_stem, write_text
 
 if TYPE_CHECKING:
@@ -84,11 +85,9 @@ def _found(source: Path) -> sl.Robot | SharedMotion:
 
 
 def _log(source: Path) -> SharedMotion:
-    try:
+    with needed_packages("A page of a log needs it", "viewer"):
         from sagline.share.course import SharedMotion
         from sagline.viewer.session import LogFollower
-    except ModuleNotFoundError as error:
-        raise sl.FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None
     session = LogFollower(source).more()
     if session is None:
         raise sl.FileError(source, "has no cycle", "Record at least one cycle.")

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Final
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.terminal import show_note, show_text, working
+from sagline.core.errors import needed_packages
 
 if TYPE_CHECKING:
     from sagline.viewer.page import Page, Source
@@ -260,11 +261,9 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
 
 def _viewer() -> type[Source]:
     """The class `Source`. FileError if a package that the viewer needs is not installed."""
-    try:
+    with needed_packages("The viewer needs it", "viewer"):
         import sagline.viewer.features  # noqa: F401
         from sagline.viewer.page import Source
-    except ModuleNotFoundError as error:
-        raise sl.FileError.not_installed(error.name, "The viewer needs it", "viewer") from None
     if find_spec(LATER) is None:
         raise sl.FileError.not_installed(LATER, "The viewer needs it", "viewer")
     return Source

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
@@ -116,6 +117,15 @@ class FileError(SaglineError):
         """Message in one line: file, reason, next step."""
         path, reason, next_step = shortened((str(self.path), self.reason, self.next_step), room=MOST - len(": . "))
         return f"{path}: {reason}. {next_step}"
+
+
+@contextmanager
+def needed_packages(needed: str, extra: str) -> Iterator[None]:
+    """Report a package that is imported in the `with` block and missing; arguments as in `FileError.not_installed`."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise FileError.not_installed(str(error.name).partition(".")[0], needed, extra) from None
 
 
 def printable(text: str, kept: str = "") -> str:

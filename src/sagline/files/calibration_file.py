@@ -177,8 +177,7 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
         The calibration.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a calibration, or of a newer format. If the
-            file was changed after it was written: digest, shapes, units and indices are checked.
+        FileError: If the file is missing, not a calibration, of a newer format, or changed after it was written.
 
     Examples:
         >>> import numpy as np

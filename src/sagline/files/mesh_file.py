@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sagline.core.arguments import brief, file_path, label
 from sagline.core.arrays import Array, Indices
-from sagline.core.errors import FileError, InvalidValueError, SaglineError
+from sagline.core.errors import FileError, InvalidValueError, SaglineError, needed_packages
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_bytes, value_errors
 from sagline.files.writing import atomic_file, check_file
@@ -85,10 +85,8 @@ def meters(unit: str, item: str) -> float:
 
 def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
     """Distinct vertices [m] and non-degenerate triangles of a file. `unit`: length unit of the file [m]."""
-    try:
+    with needed_packages("Meshes need it", "workspace"):
         import trimesh
-    except ImportError:
-        raise FileError.not_installed("trimesh", "Meshes need it", "workspace") from None
     kind = path.suffix.lower()[1:]
     if kind == "obj" and (zero := _CORNER_ZERO.search(data)):
         line = data.count(b"\n", 0, zero.end()) + 1
@@ -168,10 +166,8 @@ def _check_colors(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
 
 
 def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -> bytes:
-    try:
+    with needed_packages("Surfaces need it", "workspace"):
         import trimesh
-    except ModuleNotFoundError:
-        raise FileError.not_installed("trimesh", "Surfaces need it", "workspace") from None
     vertices, faces = surface.vertices, surface.faces
     if kind == "stl":  # STL has no list of vertices; its readers merge corners that are equal in single precision
         vertices, faces = _in_single_precision(vertices, faces)

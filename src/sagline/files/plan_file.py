@@ -179,8 +179,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         The plan. If an older file does not contain proofs, `farkas` and the fields after it are None.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a plan, or of a newer format. If the file was
-            changed after it was written: digest, shapes, units, status codes and signs are checked.
+        FileError: If the file is missing, not a plan, of a newer format, or changed after it was written.
 
     Examples:
         >>> import sagline as sl

@@ -187,8 +187,7 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
         The simulation.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a simulation, or of a newer format. If the
-            file was changed after it was written: digest, shapes, units and signs are checked.
+        FileError: If the file is missing, not a simulation, of a newer format, or changed after it was written.
 
     Examples:
         >>> import sagline as sl

@@ -168,8 +168,7 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
         The workspace.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a workspace, or of a newer format. If the
-            file was changed after it was written: digest, shapes and units are checked.
+        FileError: If the file is missing, not a workspace, of a newer format, or changed after it was written.
 
     Examples:
         >>> import sagline as sl

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Final
 
 from sagline.control.link import Refusal
 from sagline.core.arguments import whole_number
+from sagline.core.errors import needed_packages
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import LOAD, Block
-from sagline.plc.wire import ANSWER, WireError, addresses_of, plc_packages, refusal_of
+from sagline.plc.wire import ANSWER, WireError, addresses_of, refusal_of
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class _ModbusWire:
     """Connection to one PLC. Each holding register contains two bytes of a block, the same bytes as over S7."""
 
     def __init__(self, host: str, port: int, device: int) -> None:
-        with plc_packages():
+        with needed_packages("PLCs need it", "plc"):
             from pymodbus.client import ModbusTcpClient
         self._client = ModbusTcpClient(host, port=port, timeout=ANSWER, retries=0)
         self._place = (host, port)

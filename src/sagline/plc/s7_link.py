@@ -9,9 +9,10 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
 from sagline.control.link import Refusal
+from sagline.core.errors import needed_packages
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import LOAD, Block
-from sagline.plc.wire import ANSWER, WireError, addresses_of, plc_packages, refusal_of
+from sagline.plc.wire import ANSWER, WireError, addresses_of, refusal_of
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class _S7Wire:
     """Connection to one PLC over S7."""
 
     def __init__(self, host: str, port: int) -> None:
-        with plc_packages():
+        with needed_packages("PLCs need it", "plc"):
             import snap7
             import snap7.client
         client: Any = snap7.client

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from ipaddress import IPv6Address
 from typing import Any, Final, NamedTuple, Protocol
 
 from sagline.control.link import Refusal, groups_of
 from sagline.core.arguments import brief, whole_number
-from sagline.core.errors import MOST, FileError, InvalidValueError, SaglineError, shortened
+from sagline.core.errors import MOST, InvalidValueError, SaglineError, shortened
 from sagline.plc.blocks import Block
 from sagline.robot.robot import Robot
 
@@ -152,15 +151,6 @@ class Wire(Protocol):
 
     def reached(self) -> bool:
         """True if the connection is open."""
-
-
-@contextmanager
-def plc_packages() -> Iterator[None]:
-    """Context manager for the import of a package for PLCs, which reports a missing package."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise FileError.not_installed(str(error.name).partition(".")[0], "PLCs need it", "plc") from None
 
 
 def refusal_of(error: BaseException | None, protocol: str) -> Refusal:

@@ -14,6 +14,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
 
 Robots: TypeAlias = Robot | tuple[Robot, ...]  # one robot for all poses, or one checked robot per pose
 Index: TypeAlias = int | slice | NDArray[Any]  # index that selects poses of a batch
@@ -75,24 +76,27 @@ def cables_of(robot: Robots) -> Cable:
     return Cable(**{name: np.stack([material[name] for material in materials]) for name in names})
 
 
+def winches_of(robot: Robots) -> list[Winch]:
+    """Winches of the robot or robots, without unknown ones."""
+    return [one.winches for one in ((robot,) if isinstance(robot, Robot) else robot) if one.winches is not None]
+
+
 def has_routing(robot: Robots) -> bool:
     """True if any cable of the robot or robots runs over a pulley or has a dead length."""
-    robots = (robot,) if isinstance(robot, Robot) else robot
-    return any(one.winches is not None and one.winches.anything_behind for one in robots)
+    return any(winches.anything_behind for winches in winches_of(robot))
 
 
 def has_slanted_axes(robot: Robots) -> bool:
     """True if any pulley of the robot or robots swivels about an axis that is not vertical."""
-    robots = (robot,) if isinstance(robot, Robot) else robot
-    return any(one.winches is not None and bool(one.winches.slanted.any()) for one in robots)
+    return any(winches.slanted.any() for winches in winches_of(robot))
 
 
 def refuse_slanted(robot: Robots) -> None:
     """Refuse a robot with a swivel axis that is not vertical."""
-    for one in (robot,) if isinstance(robot, Robot) else robot:
-        if one.winches is not None and one.winches.slanted.any():
-            cable = int(np.argmax(one.winches.slanted))
-            shown = ", ".join(f"{x:.3g}" for x in one.winches.swivel_axis[cable])
+    for winches in winches_of(robot):
+        if winches.slanted.any():
+            cable = int(np.argmax(winches.slanted))
+            shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
             step = "Other axes are supported by inverse, forward, confirm, stiffness and modes, without friction."
             raise InvalidValueError(f"winches: swivel_axis[{cable}]", f"({shown})", "up or down here", step)
 

@@ -21,7 +21,7 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.models import Catenary, Elastic
 from sagline.core.arrays import LARGEST, Array, Flags, Indices, locked
 from sagline.kernels import codes
-from sagline.robot.batch import refuse_slanted
+from sagline.robot.batch import refuse_slanted, winches_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -64,11 +64,10 @@ class _ExitState(NamedTuple):
 
 def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
     """True if guides, or friction with the directions `winding`, make lengths differ from lengths of the kernels."""
-    winches = [one.winches for one in ((robot,) if isinstance(robot, Robot) else robot) if one.winches is not None]
     rubs = winding is not None and bool(winding.any())
     return any(
         each.guides is not None or (rubs and bool(each.pulley_friction.any() or each.rolling_friction.any()))
-        for each in winches
+        for each in winches_of(robot)
     )
 
 

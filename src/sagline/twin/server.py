@@ -16,10 +16,10 @@ from sagline.control.link import OF_WINCHES, Command, Mode, Refusal, groups_of
 from sagline.control.real_time import Pace
 from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
-from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.errors import InvalidValueError, SaglineError, needed_packages
 from sagline.dynamics.simulation.simulator import Reading
 from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, of_winches
-from sagline.plc.wire import LAST_PORT, plc_packages
+from sagline.plc.wire import LAST_PORT
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.block_servers import LOOPBACK, BlockServers
@@ -146,7 +146,7 @@ def _block_of(group: int, report: Report) -> bytes:
 
 
 def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> BlockServers:
-    with plc_packages():
+    with needed_packages("PLCs need it", "plc"):
         if modbus:
             from sagline.twin.modbus_servers import ModbusServers
 
