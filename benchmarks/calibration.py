@@ -16,7 +16,7 @@ from sagline.calibration.least_squares import best_step, evaluate_step
 from sagline.calibration.parameters import parameters_of, with_values
 from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, start_of
 from sagline.core.arrays import Array
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import Drums
 from tests.calibration.synthetic import Truth, true_robot, usual_sensors, with_drums
 from tests.calibration.varied import ERRORS, at_chosen, left_error, varied
 
@@ -49,7 +49,7 @@ def plain_seconds(log: sl.WinchLog) -> float:
     def misses(x: Array) -> Array:
         numbers, lengths = x[:width], x[width:].reshape(state.lengths.shape)
         robot = with_values(COGIRO, problem.parameters, problem.parameters.external(numbers))
-        drums = drums_of(robot)
+        drums = Drums.of(robot)
         said = drums.lengths_at(log.readings) / (1.0 + drums.rest_strain)
         found = sl.forward(robot, lengths, log.commanded)
         cells = (read - found.state.cables.frame_end_tension) / deviation

@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import Drums
 from tests.kernels.cable.test_pulley import lengths_and_recovered_tensions
 from tests.kinematics.test_pulleys import formula_error
 from tests.kinematics.winches import wound
@@ -24,7 +24,7 @@ ROBOTS = ("article-suspended", "article-mixed", "cogiro", "ipanema-1")
 def counts() -> Iterator[Row]:
     """Conversion of counts to lengths and back, over four layers with a moving exit point."""
     robot = wound()
-    drums = drums_of(robot)
+    drums = Drums.of(robot)
     turns = np.random.default_rng(6).uniform(0.0, drums.most[0], (COUNTS // 8, 8))
     given = np.rint(drums.counts(drums.lengths(turns)))
     length = sl.lengths_from_counts(robot, given)

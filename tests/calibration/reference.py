@@ -11,7 +11,7 @@ import sagline as sl
 from sagline.calibration.parameters import KINDS, Parameters
 from sagline.core.arrays import Array, locked
 from sagline.kernels.calibration import kinds
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import Drums
 
 # steps of the differences in meters, newtons and radians; relative steps for parameters with a logarithm
 STEPS = {
@@ -108,7 +108,7 @@ class Machine:
 
 def counts_of(robot: sl.Robot, lengths: Array) -> Array:
     """Counts at unstrained lengths (N, m), not rounded, unlike `encoder_counts`."""
-    drums = drums_of(robot)
+    drums = Drums.of(robot)
     return drums.counts(lengths * (1.0 + drums.rest_strain))
 
 

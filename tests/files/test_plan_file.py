@@ -380,7 +380,7 @@ def test_a_damaged_file_without_its_digest_is_refused_before_anything_is_read(
     saved.write_bytes(saved.read_bytes()[:-SEAL])
     monkeypatch.setattr("h5py.File", None)
     assert_refused(saved, "digest")
-    assert not netcdf.is_of(saved, FORMAT)
+    assert not FORMAT.matches(saved)
 
 
 def test_bytes_after_the_end_are_reported(saved: FilePath, snapshot: SnapshotAssertion) -> None:

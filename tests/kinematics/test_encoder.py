@@ -8,7 +8,7 @@ import pytest
 import sagline as sl
 from sagline import Plan
 from sagline.article.ten_poses import tour
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import Drums
 from tests.kinematics.winches import wound
 from tests.refusal import refused
 from tests.tiers import extended
@@ -27,7 +27,7 @@ def plan(robot: sl.Robot) -> sl.Plan:
 
 
 def test_a_million_counts_are_recovered_over_four_layers(robot: sl.Robot) -> None:
-    drums = drums_of(robot)
+    drums = Drums.of(robot)
     assert drums.most[0] == pytest.approx(80.0)
     rng = np.random.default_rng(5)
     turns = rng.uniform(0.0, 80.0, (125_000, 8))

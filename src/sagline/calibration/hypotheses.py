@@ -16,7 +16,7 @@ from sagline.calibration.parameters import Unknown, parameters_of
 from sagline.calibration.problem import Evaluated, FitProblem, ReadingsTable, SearchState, start_of
 from sagline.core.arrays import Array, Indices
 from sagline.core.indices import evenly_spaced
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import Drums
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -180,7 +180,7 @@ class Trial:
 
     def _counts_of_length(self) -> Array:
         """Encoder counts (m,) per meter of cable that leaves the lowest layer of each drum [1/m]."""
-        drums = drums_of(self.robot)
+        drums = Drums.of(self.robot)
         rate = drums.zero_and_rate()[1]
         _, travel = drums.turns(drums.starts[:, :1].T)
         return np.asarray(rate / np.abs(travel[0]))

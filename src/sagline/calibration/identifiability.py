@@ -20,7 +20,7 @@ from sagline.calibration.parameters import Parameters, PriorUnits
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import Drums
 from sagline.robot.robot import Robot
 
 OPEN: Final = 1e-12  # rounding error of a singular value that is exactly zero, relative to the largest singular value
@@ -306,7 +306,7 @@ def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
     if not counted:
         shift[kinds.ZERO] = share[kinds.SCALE] = 1.0
         return shift, share
-    drums = drums_of(robot)
+    drums = Drums.of(robot)
     stretch, zero = 1.0 + drums.rest_strain, drums.winches.length_zero
     radius, diameter, pitch = drums.winches.drum_radius, robot.cables.diameter, drums.winches.groove_pitch
     if zero is None or radius is None or diameter is None or pitch is None:  # counts give no lengths without these data

@@ -20,7 +20,7 @@ from sagline.kernels.calibration.terms import BESIDE, PoseReadings, SensingArray
 from sagline.kernels.forward.platform import ForwardTerms
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import has_routing
-from sagline.robot.drum import Drums, drums_of
+from sagline.robot.drum import Drums
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows
@@ -47,7 +47,7 @@ def counts_at(drums: Drums, lengths: Array) -> Array:
 
 
 def _known_field(of: Winch | Cable, name: str) -> Array:
-    """Value of a field of the winches; `drums_of` has checked that the field is not None."""
+    """Value of a field of the winches; `Drums.of` has checked that the field is not None."""
     return np.asarray(getattr(of, name))
 
 
@@ -146,7 +146,7 @@ class MachineTerms(NamedTuple):
             np.broadcast_to(scale, robot.cable_count),
             np.broadcast_to(late, robot.cable_count),
             np.broadcast_to(swivel_zero, robot.cable_count),
-            drums_of(robot) if parameters.counted else None,
+            Drums.of(robot) if parameters.counted else None,
             (model.code, *model.parameters, has_routing(robot) or None),
             body_table(robot),
             cable_table(robot),
@@ -202,7 +202,7 @@ class MachineTerms(NamedTuple):
             value = _known_field(winches, name)
             step = STEP * value
             ends = (robot.replace(winches=winches.replace(**{name: value + sign * step})) for sign in (-1.0, 1.0))
-            low, high = (lengths_at_counts(drums_of(end), counts) for end in ends)
+            low, high = (lengths_at_counts(Drums.of(end), counts) for end in ends)
             slopes[row] = (high - low) / (2.0 * step)
         return slopes
 

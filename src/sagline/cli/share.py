@@ -64,7 +64,6 @@ def share(
 
 def _found(source: Path) -> sl.Robot | SharedMotion:
     from sagline.files.calibration_file import FORMAT as CALIBRATION
-    from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT as SIMULATION
     from sagline.share.course import SharedMotion
 
@@ -73,9 +72,9 @@ def _found(source: Path) -> sl.Robot | SharedMotion:
         return _log(source)
     if suffix != ".nc":
         return sl.load_robot(str(source))
-    if is_of(source, SIMULATION):
+    if SIMULATION.matches(source):
         return SharedMotion.of_simulation(sl.load_simulation(source))
-    if is_of(source, CALIBRATION):
+    if CALIBRATION.matches(source):
         return sl.load_calibration(source).robot
     plan = sl.load_plan(source)
     if not plan.state.pose.shape:

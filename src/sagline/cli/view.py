@@ -186,7 +186,6 @@ def _view_log(
 
 def _played_in(robot: sl.Robot, file: Path) -> Played:
     """The run, simulation or log in `file`. FileError if `file` does not belong to `robot`."""
-    from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT
     from sagline.viewer.playback import PlayedPlan, PlayedSimulation
     from sagline.viewer.session import LogFollower
@@ -195,7 +194,7 @@ def _played_in(robot: sl.Robot, file: Path) -> Played:
         session = _first_session(LogFollower(file), [file], live=False)
         _check_robot(file, "log", session.robot, robot)
         return session
-    if is_of(file, FORMAT):
+    if FORMAT.matches(file):
         simulation = sl.load_simulation(file)
         _check_robot(file, "simulation", simulation.robot, robot)
         return PlayedSimulation(simulation)
@@ -271,9 +270,8 @@ def _viewer() -> type[Source]:
 
 def _is_calibration(file: Path) -> bool:
     from sagline.files.calibration_file import FORMAT as CALIBRATION
-    from sagline.files.netcdf import is_of
 
-    return file.suffix.lower() == ".nc" and is_of(file, CALIBRATION)
+    return file.suffix.lower() == ".nc" and CALIBRATION.matches(file)
 
 
 def _mode(text: str | None) -> str:

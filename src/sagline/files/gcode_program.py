@@ -12,7 +12,7 @@ from typing import Final, Literal, NamedTuple, NoReturn, cast
 from sagline.core.arrays import FARTHEST
 from sagline.core.errors import FileError, printable
 from sagline.files.table import line_error
-from sagline.motion.contour import EXACT_STOP, LEAST, Moves, Point, Row, moves_of
+from sagline.motion.contour import EXACT_STOP, LEAST, Moves, Point, Row
 
 Dialect = Literal["linuxcnc", "marlin"]
 
@@ -394,6 +394,6 @@ class _Program:
 
     def moves(self) -> Moves:
         """The moves since the last block; the next block begins."""
-        found = moves_of(self.rows, self.block_start)
+        found = Moves.of_rows(self.rows, self.block_start)
         self.rows, self.block_start = array("d"), self.position or self.block_start
         return found

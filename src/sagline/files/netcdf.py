@@ -127,6 +127,19 @@ class Format(Generic[T]):
             raise FileError(path, f"has the unknown format {found!r}", step, item=self.key)
         check_version(path, int(found), self.version, attributes.get("source"), self.key)
 
+    def matches(self, path: Path) -> bool:
+        """True if a file has the attributes of this format. Nothing else is checked."""
+        from h5py import File
+
+        try:
+            check_regular(path, path.stat().st_mode)
+            if not _digest_is_right(path):
+                return False
+            with File(path) as file:
+                return self.key in file.attrs
+        except (FileError, OSError, RuntimeError, ValueError):
+            return False
+
     def attributes(self, title: str) -> dict[str, Any]:
         """Attributes of every file of this format."""
         return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
@@ -203,20 +216,6 @@ def _file_errors(path: Path) -> Iterator[None]:
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:  # parts that do not agree
         (text,) = shortened((f"{type(error).__name__}: {error}",), 120)
         raise FileError(path, f"has parts that do not agree ({text})", step) from error
-
-
-def is_of(path: Path, content: Format[Any]) -> bool:
-    """True if a file has the attributes of `content`. Nothing else is checked."""
-    from h5py import File
-
-    try:
-        check_regular(path, path.stat().st_mode)
-        if not _digest_is_right(path):
-            return False
-        with File(path) as file:
-            return content.key in file.attrs
-    except (FileError, OSError, RuntimeError, ValueError):
-        return False
 
 
 def _load(path: Path, content: Format[Any]) -> Dataset:

@@ -22,7 +22,7 @@ from sagline.files.writing import write_text
 from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, dump_mapping, parse_mapping, validate
 from sagline.motion.path import Path, path_from_samples
 from sagline.motion.rest_to_rest import quintic_path, septic_path
-from sagline.robot.drum import drums_of, has_drum_data
+from sagline.robot.drum import Drums, has_drum_data
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
         "unstrained_length": plan.unstrained_length,
     }
     if has_drum_data(plan.robot):
-        rows["counts"] = counts_at(drums_of(plan.robot), plan.unstrained_length)
+        rows["counts"] = counts_at(Drums.of(plan.robot), plan.unstrained_length)
     poses = [
         {name: _round(row, _DECIMALS[name]) for name, row in zip(rows, each, strict=True)}
         for each in zip(*rows.values(), strict=True)

@@ -17,7 +17,7 @@ from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory
 from sagline.kinematics.plan import Plan
-from sagline.robot.drum import Drums, drum_tension, drums_of, warmth
+from sagline.robot.drum import Drums, drum_tension, warmth
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
@@ -71,7 +71,7 @@ def encoder_counts(
     robot = instance(plan, Plan, "plan").robot
     choice(winding, "winding", get_args(Winding))
     optional(creep, Creep, "creep")
-    drums = drums_of(robot)
+    drums = Drums.of(robot)
     longer = warmth(robot, temperature)
     if creep is not None:
         longer = longer * (1.0 + _creep_strain(plan, creep))
@@ -119,7 +119,7 @@ def lengths_from_counts(
     Source:
         docs/model.md, section 10.
     """
-    drums = drums_of(instance(robot, Robot, "robot"))
+    drums = Drums.of(instance(robot, Robot, "robot"))
     choice(winding, "winding", get_args(Winding))
     rows = _rows(robot, counts, "counts", "")
     path = drums.lengths_at(np.atleast_2d(rows))
@@ -295,7 +295,7 @@ def _levers(robot: Robot, length: Array) -> tuple[Winch, Array, Array]:
     bare = cables.diameter is None and winches is not None and winches.groove_pitch is None
     if bare and winches is not None and winches.drum_radius is not None:
         return winches, 1.0 + winches.winding_tension / cables.axial_stiffness, winches.drum_radius
-    drums = drums_of(robot)
+    drums = Drums.of(robot)
     stretch = 1.0 + drums.rest_strain
     _, travel = drums.turns(length * stretch)
     return drums.winches, stretch, travel / (2.0 * np.pi)

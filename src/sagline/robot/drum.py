@@ -47,6 +47,26 @@ class Drums:
     fewest: Array
     most: Array
 
+    @classmethod
+    def of(cls, robot: Robot) -> Drums:
+        """Drums of a robot. The winches must have drum_radius and groove_pitch, and the cables a diameter.
+
+        Drums with several layers also need drum_width and cable_length. A drum_distance also requires cable_length.
+        """
+        winches, diameter = robot.winches, robot.cables.diameter
+        names = ["drum_radius", "groove_pitch"]
+        if winches is not None and (winches.layers > 1.0).any():
+            names += ["drum_width", "cable_length"]
+        elif winches is not None and winches.drum_distance is not None:
+            names += ["cable_length"]
+        missing = [f"winches: {name}" for name in names if winches is None or getattr(winches, name) is None]
+        if diameter is None:
+            missing.append("cables: diameter")
+        if winches is None or diameter is None or missing:
+            step = "Give them in the robot file, or with robot.replace(winches=Winch(...), cables=Cable(...))."
+            raise InvalidValueError(*not_given(missing), "a known value for each drum", step)
+        return cls(winches, *_tables(winches, diameter), *_limits(winches, robot))
+
     def turns(self, length: Array) -> tuple[Array, Array]:
         """Turns on the drums and change of length per turn [m] for lengths off the drums (N, m) [m]; NaN stays NaN."""
         turns, travel = self._turns(length)
@@ -128,26 +148,6 @@ class Drums:
         return InvalidValueError(item, value, allowed, step)
 
 
-def drums_of(robot: Robot) -> Drums:
-    """Drums of a robot. The winches must have drum_radius and groove_pitch, and the cables a diameter.
-
-    Drums with several layers also need drum_width and cable_length. A drum_distance also requires cable_length.
-    """
-    winches, diameter = robot.winches, robot.cables.diameter
-    names = ["drum_radius", "groove_pitch"]
-    if winches is not None and (winches.layers > 1.0).any():
-        names += ["drum_width", "cable_length"]
-    elif winches is not None and winches.drum_distance is not None:
-        names += ["cable_length"]
-    missing = [f"winches: {name}" for name in names if winches is None or getattr(winches, name) is None]
-    if diameter is None:
-        missing.append("cables: diameter")
-    if winches is None or diameter is None or missing:
-        step = "Give them in the robot file, or with robot.replace(winches=Winch(...), cables=Cable(...))."
-        raise InvalidValueError(*not_given(missing), "a known value for each drum", step)
-    return Drums(winches, *_tables(winches, diameter), *_limits(winches, robot))
-
-
 def has_drum_data(robot: Robot) -> bool:
     """True if the robot has all data of its winches that the computation of lengths from counts needs."""
     names = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")
@@ -167,11 +167,8 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
     """Table of the drums for kernels, and the lengths off the drums at which layers begin [m]."""
     pitch, width = _given(winches, "groove_pitch"), winches.drum_width
     if width is not None:
-        allowed, step = (
-            ">= {limit:g} m, its groove_pitch",
-            "A layer has at least one turn; correct one of the two values.",
-        )
-        refuse_first(width < pitch, "winches: drum_width", width, "m", allowed, step, pitch)
+        step = "A layer has at least one turn; correct one of the two values."
+        refuse_first(width < pitch, "winches: drum_width", width, "m", ">= {limit:g} m, its groove_pitch", step, pitch)
     table = np.empty((len(pitch), drum.DRUM_COLUMNS))
     table[:, drum.PITCH_RADIUS] = _given(winches, "drum_radius") + 0.5 * diameter
     table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies in the gap between two turns below
@@ -272,7 +269,7 @@ def drum_lever(robot: Robot, length: Array) -> Array:
         step = "Give it in the robot file, or with robot.replace(winches=Winch(drum_radius=...))."
         raise InvalidValueError("winches: drum_radius", "not given", "known if winch speeds are computed", step)
     if winch.groove_pitch is not None and robot.cables.diameter is not None:
-        drums = drums_of(robot)
+        drums = Drums.of(robot)
         travel: Array = drums.turns(np.atleast_2d(length) * (1.0 + drums.rest_strain))[1] / (2.0 * np.pi)
         return travel.reshape(length.shape)
     thick = 0.0 if robot.cables.diameter is None else 0.5 * robot.cables.diameter

@@ -19,7 +19,7 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
 from sagline.robot.batch import dead_cable
-from sagline.robot.drum import drum_lever, drums_of
+from sagline.robot.drum import Drums, drum_lever
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose, single_pose
 from sagline.robot.robot import Robot
@@ -41,7 +41,7 @@ class _EncoderScale:
         self.per_meter = each * stretch / (2.0 * np.pi * drum_lever(robot, length))
         self._drums = None
         if winch.groove_pitch is not None and robot.cables.diameter is not None:
-            drums = drums_of(robot)
+            drums = Drums.of(robot)
             self._drums = (drums.table, drums.starts)
             self._stretch, self._each, self._work = stretch, each, np.empty((3, 1, robot.cable_count))
             self._at_no_turns = counts + each * drums.turns((length * stretch)[None])[0][0]

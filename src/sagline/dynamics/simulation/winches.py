@@ -14,7 +14,7 @@ from sagline.core.fields import NumberFields, rule
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.progress import read_cells, read_encoders
 from sagline.kernels.jit import bound
-from sagline.robot.drum import drum_lever, drums_of, not_given
+from sagline.robot.drum import Drums, drum_lever, not_given
 from sagline.robot.robot import Robot
 
 AIR: Final = 1.2  # density of air [kg/m^3]
@@ -110,7 +110,7 @@ class Encoders:
 
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
         """Create the encoders of a robot with complete drum data; `wound` (m,) [m]; `stretch` (m,)."""
-        drums, m = drums_of(robot), robot.cable_count
+        drums, m = Drums.of(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
         self.counts = np.empty(m)  # whole counts, as floats
         offset = drums.winches.count_zero + zero * rate
