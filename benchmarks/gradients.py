@@ -20,6 +20,7 @@ from benchmarks.measure import Row, best_of_calls, best_seconds, one_core, show
 from sagline.core.arrays import Array
 
 BATCH = 1000
+REPEATS = 40  # so that one of them is without other programs
 Times = tuple[float, float]  # of one call, and per sample of a batch [s]
 
 
@@ -30,7 +31,7 @@ def times_in_jax(call: Callable[..., Any], given: Array, gradient: bool) -> Time
     one, many = jax.numpy.asarray(given), jax.numpy.tile(given, (BATCH, 1))
     return (
         best_of_calls(lambda: jax.block_until_ready(alone(one)), calls=100),
-        best_seconds(lambda: jax.block_until_ready(batch(many))) / BATCH,
+        best_seconds(lambda: jax.block_until_ready(batch(many)), REPEATS) / BATCH,
     )
 
 
@@ -47,7 +48,7 @@ def times_in_torch(call: Callable[..., Any], given: Array, gradient: bool) -> Ti
         if gradient:
             torch.autograd.grad(found.sum(), values)
 
-    return best_of_calls(lambda: run(one), calls=100), best_seconds(lambda: run(many)) / BATCH
+    return best_of_calls(lambda: run(one), calls=3, repeats=100), best_seconds(lambda: run(many), REPEATS) / BATCH
 
 
 def rows() -> Iterator[Row]:
