@@ -176,7 +176,7 @@ def test_a_call_that_does_not_fit_an_entry_is_an_error_of_jax() -> None:
     reason = "no such entry"
     for entry, *arguments in ((no_entry, 1.0), (least_stiffnesses, np.ones((6, 6)), np.ones((1, 6, 6)))):
         with pytest.raises(jax.errors.JaxRuntimeError, match=reason):
-            jax.block_until_ready(calls.call_kernel(entry, *arguments, calls.Output((1,))))
+            jax.block_until_ready(calls.ffi_call(entry, *arguments, calls.ResultArray((1,))))
 
 
 @extended

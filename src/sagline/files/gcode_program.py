@@ -12,12 +12,12 @@ from typing import Final, Literal, NamedTuple, NoReturn, cast
 from sagline.core.arrays import FARTHEST
 from sagline.core.errors import FileError, printable
 from sagline.files.table import line_error
-from sagline.motion.contour import EXACT_STOP, LEAST, Moves, Point, Row
+from sagline.motion.contour import EXACT_STOP, LEAST, Moves, Point, MoveRow
 
 Dialect = Literal["linuxcnc", "marlin"]
 
 BATCH: Final = 8192  # number of moves per block
-_DWELL: Final = Row._fields.index("dwell")
+_DWELL: Final = MoveRow._fields.index("dwell")
 OFFSETS: Final = ("G54", "G55", "G56", "G57", "G58", "G59")
 _LINE: Final = re.compile(r"[^\n]*\n?")
 _COMMENT: Final = re.compile(r"\([^()]*\)|;.*")
@@ -64,7 +64,7 @@ def program_moves(path: Path, text: str, settings: Settings) -> Iterator[Moves]:
         program.line = number
         if not program.read(found[0]):
             break
-        if len(program.rows) >= BATCH * len(Row._fields):
+        if len(program.rows) >= BATCH * len(MoveRow._fields):
             yield program.moves()
     if not program.moved:
         step = "Check that this is the file you mean."
@@ -222,7 +222,7 @@ class _Program:
         elif action in (28, 29, 30):
             self.homed = self.line if self.moved else 0
             if not self.moved:  # the rows contain dwells only
-                self.waiting += sum(self.rows[_DWELL :: len(Row._fields)])
+                self.waiting += sum(self.rows[_DWELL :: len(MoveRow._fields)])
                 self.position, self.rows = self.settings.start, array("d")
         elif action == 92:
             given = [axis for axis, letter in enumerate("XYZ") if letter in words]
@@ -254,7 +254,7 @@ class _Program:
     def _wait(self) -> None:
         """Append the dwells that wait for a known position."""
         if self.waiting > 0.0:
-            row = Row(*self._known(), 0.0, 0.0, 0.0, 0, 0.0, 0.0, EXACT_STOP, self.waiting, self.line)
+            row = MoveRow(*self._known(), 0.0, 0.0, 0.0, 0, 0.0, 0.0, EXACT_STOP, self.waiting, self.line)
             self.waiting = 0.0
             self._append(row)
 
@@ -311,7 +311,7 @@ class _Program:
         self._wait()
         length = dist(self._known(), target)
         speed = self._speed(motion, length)
-        self._append(Row(*target, 0.0, 0.0, 0.0, 0, 0.0, speed, self.tolerance, 0.0, self.line), length)
+        self._append(MoveRow(*target, 0.0, 0.0, 0.0, 0, 0.0, speed, self.tolerance, 0.0, self.line), length)
 
     def _speed(self, motion: float, length: float) -> float:
         """Speed of a move [m/s]."""
@@ -322,7 +322,7 @@ class _Program:
             self.refuse(f"G{motion:g} without a feed; allowed: F {where}")
         return self.feed * length if self.inverse_time else self.feed
 
-    def _append(self, row: Row, length: float = 0.0) -> None:
+    def _append(self, row: MoveRow, length: float = 0.0) -> None:
         if length > LEAST or row.dwell:
             self.rows.extend(row)
             self.moved = self.moved or not row.dwell
@@ -353,7 +353,7 @@ class _Program:
         angle += (tau if angle <= _FULL else 0.0) + tau * (self._turns(words) - 1)
         length = hypot(0.5 * (first + last) * angle, target[n] - start[n])
         speed, signed = self._speed(2 if clockwise else 3, length), -angle if clockwise else angle
-        self._append(Row(*target, *center, n, signed, speed, self.tolerance, 0.0, self.line), length)
+        self._append(MoveRow(*target, *center, n, signed, speed, self.tolerance, 0.0, self.line), length)
 
     def _turns(self, words: dict[str, float]) -> float:
         """Number of turns of an arc, also begun ones."""

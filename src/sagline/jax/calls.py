@@ -11,7 +11,7 @@ import numpy as np
 
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.jit import VARIABLE, backend, compiled_library
-from sagline.kinematics.differentiable import Output as Output
+from sagline.kinematics.differentiable import ResultArray as ResultArray
 from sagline.kinematics.differentiable import Work
 
 TARGET: Final = "sagline"
@@ -27,7 +27,7 @@ def register() -> None:
     jax.ffi.register_ffi_target(TARGET, jax.ffi.pycapsule(compiled_library().xla), platform="cpu")
 
 
-def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
+def ffi_call(entry: Callable[..., object], *arguments: Any) -> list[Any]:
     """Outputs of a kernel. Its arguments are numbers, None, arrays, and new arrays for work and output, in tuples."""
     operands: list[Any] = []
     results: list[Any] = []
@@ -37,7 +37,7 @@ def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
 
     def form(value: Any) -> str:
         """Format of an argument, as the library declares it."""
-        if isinstance(value, tuple) and not isinstance(value, Work | Output):
+        if isinstance(value, tuple) and not isinstance(value, Work | ResultArray):
             return f"({''.join(map(form, value))})"
         if value is None:
             return "N"
@@ -46,11 +46,11 @@ def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
             return "?" if isinstance(value, bool) else "i" if isinstance(value, int) else "f"
         if isinstance(value, Work):
             sizes.extend(value.shape)
-        elif isinstance(value, Output):
+        elif isinstance(value, ResultArray):
             results.append(jax.ShapeDtypeStruct(*value))
         else:
             operands.append(value)
-        plan.append("s" if isinstance(value, Work) else "r" if isinstance(value, Output) else "a")
+        plan.append("s" if isinstance(value, Work) else "r" if isinstance(value, ResultArray) else "a")
         return f"{LETTERS[np.dtype(value.dtype).name]}{len(value.shape)}"
 
     text = form(arguments)

@@ -16,7 +16,7 @@ from jax.custom_derivatives import SymbolicZero
 
 from sagline.cables.model import CableModel
 from sagline.core.errors import InvalidValueError
-from sagline.jax.calls import call_kernel, register
+from sagline.jax.calls import ffi_call, register
 from sagline.kinematics.differentiable import (
     CATENARY,
     Forward,
@@ -140,7 +140,7 @@ def _of(kind: type[Kinematics], robot: Robot, model: CableModel | str, function:
         step = 'Call jax.config.update("jax_enable_x64", True) at the beginning of the program.'
         raise InvalidValueError("jax_enable_x64", False, "True, because poses need double precision", step)
     register()
-    return kind(robot, model, f"sagline.jax.{function}", jnp, call_kernel)
+    return kind(robot, model, f"sagline.jax.{function}", jnp, ffi_call)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))

@@ -82,7 +82,7 @@ class Work(NamedTuple):
     dtype: Any
 
 
-class Output(NamedTuple):
+class ResultArray(NamedTuple):
     """Array that a kernel fills, and which its call returns."""
 
     shape: tuple[int, ...]
@@ -94,9 +94,9 @@ def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
     outputs = []
 
     def real(value: Any) -> Any:
-        if isinstance(value, Work | Output):
+        if isinstance(value, Work | ResultArray):
             array = np.empty(value.shape, value.dtype)
-            if isinstance(value, Output):
+            if isinstance(value, ResultArray):
                 outputs.append(array)
             return array
         return (
@@ -198,11 +198,11 @@ class Kinematics:
         rest = self.numpy.broadcast_to(rest, (len(frame), *rest.shape[1:]))
         return self.freedom, self.body, self.numpy.concatenate((frame, platform, rest), axis=2)
 
-    def states(self, count: int) -> tuple[Output, ...]:
+    def states(self, count: int) -> tuple[ResultArray, ...]:
         """Outputs of `describe_states`."""
         m = self.cables
         shapes = (6, 6), (m, 3, 3), (sensitivity.DATA, m, 3), (m, 3), (m, 3), (m, 7)
-        return tuple(Output((count, *shape)) for shape in shapes)
+        return tuple(ResultArray((count, *shape)) for shape in shapes)
 
     def frame_end_tension(self, results: Value) -> Value:
         """Tensions at the frame ends (N, m) of `results` (rows, N, m)."""
@@ -244,8 +244,12 @@ class ForwardKinematics(Kinematics):
         pose, results, _, _, status = self.call(
             *(forward_poses, self.terms, False, given, tuple(works), self.memory),
             (
-                *(Output((count, tables.POSE_COLUMNS)), Output((self.rows, count, m)), Output((count, m), np.int8)),
-                *(Output((count, tables.FORWARD_NUMBERS)), Output((count,), np.int8)),
+                *(
+                    ResultArray((count, tables.POSE_COLUMNS)),
+                    ResultArray((self.rows, count, m)),
+                    ResultArray((count, m), np.int8),
+                ),
+                *(ResultArray((count, tables.FORWARD_NUMBERS)), ResultArray((count,), np.int8)),
             ),
         )
         stable = (status[:, None] == np.array(STABLE)).any(axis=1)[:, None]
@@ -260,7 +264,7 @@ class ForwardKinematics(Kinematics):
         found = self.call(
             *(sensitivity.sensitivities_of_states, self.terms, self.robots(frame, platform), first),
             *(results.swapaxes(0, 1), self.memory, self.states(count)),
-            tuple(Output((count, *shape)) for shape in shapes),
+            tuple(ResultArray((count, *shape)) for shape in shapes),
         )
         slopes, compliance, by_data, by_frame, by_platform = found[5:10]
         turn, rates = self.rotation(first[:, 3:]), self.rates(first[:, 3:])
@@ -301,8 +305,8 @@ class InverseKinematics(Kinematics):
             *(inverse_poses, self.model, method, self.limits, self.robots(frame, platform), pose, wrench),
             *(Work((m,), np.float64), self.memory, None, False),
             (
-                *(Output((self.rows, count, m)), Output((count, m), np.int8), Output((count, 2))),
-                *(Output((count, self.free)), Output((count,), np.int8)),
+                *(ResultArray((self.rows, count, m)), ResultArray((count, m), np.int8), ResultArray((count, 2))),
+                *(ResultArray((count, self.free)), ResultArray((count,), np.int8)),
             ),
             *(0, count),
         )
@@ -315,7 +319,7 @@ class InverseKinematics(Kinematics):
         found = self.call(
             *(distribution.sensitivities_of_lengths, self.terms, self.limits, self.robots(frame, platform), pose),
             *(results.swapaxes(0, 1), goal, self.memory, self.states(count)),
-            Output((count, m, distribution.LENGTH_COLUMNS * m + 6)),
+            ResultArray((count, m, distribution.LENGTH_COLUMNS * m + 6)),
         )
         levers, slopes, by_inputs = found[3], found[5], found[6]
         turn, rates = self.rotation(pose[:, 3:]), 2.0 * self.rates(pose[:, 3:]).swapaxes(1, 2)

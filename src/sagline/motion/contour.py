@@ -25,7 +25,7 @@ BLOCK: Final = 1 << 16  # largest number of samples per block
 Point = tuple[float, float, float]
 
 
-class Row(NamedTuple):
+class MoveRow(NamedTuple):
     """A move: where it ends, its arc, and its speed."""
 
     x: float
@@ -68,7 +68,7 @@ class Moves:
     @classmethod
     def of_rows(cls, numbers: array[float], start_of_all: Point) -> Moves:
         """Moves from the numbers of all rows; `start_of_all`: start of the first move [m]."""
-        rows = np.array(numbers).reshape(-1, len(Row._fields))
+        rows = np.array(numbers).reshape(-1, len(MoveRow._fields))
         end = rows[:, :3]
         start = np.vstack((start_of_all, end))[:-1]
         center, axis, angle = rows[:, 3:6], rows[:, 6].astype(np.int64), rows[:, 7]
