@@ -12,7 +12,7 @@ from typing import Final, Literal, NamedTuple, NoReturn, cast
 from sagline.core.arrays import FARTHEST
 from sagline.core.errors import FileError, printable
 from sagline.files.table import line_error
-from sagline.motion.contour import EXACT_STOP, LEAST, Moves, Point, MoveRow
+from sagline.motion.contour import EXACT_STOP, LEAST, MoveRow, Moves, Point
 
 Dialect = Literal["linuxcnc", "marlin"]
 
