@@ -35,21 +35,13 @@ _FACES: Final = np.reshape([int(n) for n in "01303246747504505123727602606415717
 
 
 class _Solid(NamedTuple):
-    """A body for fcl.
+    """A body for fcl."""
 
-    Attributes:
-        geometry: Geometry of the body.
-        radius: Radius of a rod or ball, which is subtracted from distances [m].
-        mesh: Triangles of the body; None for rods and balls.
-        inner: A point inside the body [m].
-        place: Rotation and position of a body at rest.
-    """
-
-    geometry: Any
-    radius: float
-    mesh: Mesh | None
-    inner: Array
-    place: tuple[Array, Array]
+    geometry: Any  # geometry of the body
+    radius: float  # radius of a rod or ball, which is subtracted from distances [m]
+    mesh: Mesh | None  # triangles of the body; None for rods and balls
+    inner: Array  # point inside the body [m]
+    place: tuple[Array, Array]  # rotation and position of a body at rest
 
 
 _Nearest = tuple[float, float, Array, Array]

@@ -105,21 +105,13 @@ _NO_LENGTH = "cables and platform: give from_anchor, the length of cable at the 
 
 
 class Pairs(NamedTuple):
-    """Pairs of numbered bodies: first all parts of cables, then the platform (even without shape), then the obstacles.
+    """Pairs of numbered bodies: first all parts of cables, then the platform (even without shape), then obstacles."""
 
-    Attributes:
-        parts: Parts of cables that occur in pairs.
-        by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
-        with_mesh: Numbers of the pairs with at least one mesh, shape (Q, 2).
-        names: Names of all pairs, in the order of their numbers.
-        left_out: Pairs that are not measured, with the reasons.
-    """
-
-    parts: tuple[_CablePart, ...]
-    by_kernel: Indices
-    with_mesh: Indices
-    names: tuple[tuple[str, str], ...]
-    left_out: tuple[str, ...]
+    parts: tuple[_CablePart, ...]  # parts of cables that occur in pairs
+    by_kernel: Indices  # numbers of the pairs that kernels measure, shape (P, 2)
+    with_mesh: Indices  # numbers of the pairs with at least one mesh, shape (Q, 2)
+    names: tuple[tuple[str, str], ...]  # names of all pairs, in the order of their numbers
+    left_out: tuple[str, ...]  # pairs that are not measured, with the reasons
 
 
 Body = _CablePart | int  # part of a cable, -1 for the platform, or number of an obstacle

@@ -215,31 +215,21 @@ def _given(value: Any) -> Any:
 
 @frozen(eq=False, weakref_slot=False)
 class Request:
-    """Checked arguments of `design`, without the number of evaluations.
-
-    Attributes:
-        robot: Initial robot of the search.
-        free: Design variables.
-        goals: Goals.
-        wrenches: Set of wrenches; None for the platform's weight alone.
-        poses: Batch of poses.
-        model: Cable model.
-        inner: Anchors that the machine moves during operation.
-        robust: Errors of the anchors, or None.
-        optimizer: Name of the optimizer.
-        seed: Seed of all random numbers.
-    """
+    """Checked arguments of `design`, without the number of evaluations."""
 
     robot: Robot = field(metadata=checked_by(lambda value, item: instance(value, Robot, item)))
-    free: tuple[Free, ...] = field(converter=_given, metadata=checked_by(free_parts))
+    free: tuple[Free, ...] = field(converter=_given, metadata=checked_by(free_parts))  # design variables
     goals: tuple[Goal, ...] = field(converter=_given, metadata=checked_by(_goals))
+    # set of wrenches; None for the platform's weight alone
     wrenches: WrenchSet | None = field(metadata=checked_by(lambda value, item: optional(value, WrenchSet, item)))
     poses: Pose
     model: CableModel = field(converter=_given, metadata=checked_by(lambda value, _: model_of(value)))
+    # anchors that the machine moves during operation
     inner: tuple[Free, ...] = field(converter=_given, metadata=checked_by(free_parts))
+    # errors of the anchors, or None
     robust: AnchorErrors | None = field(metadata=checked_by(lambda value, item: optional(value, AnchorErrors, item)))
     optimizer: str = field(metadata=checked_by(lambda value, item: str(choice(value, item, SEARCHES))))
-    seed: int = field(metadata=checked_by(whole_number, 0, _SEED))
+    seed: int = field(metadata=checked_by(whole_number, 0, _SEED))  # seed of all random numbers
 
     def __attrs_post_init__(self) -> None:
         """Check each argument, then combinations of arguments."""

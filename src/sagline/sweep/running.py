@@ -83,7 +83,7 @@ def run(
     """
     instance(request, Request, "request")
     path = file_path(folder, "folder", folder=True)
-    count = cores() if workers is None else whole_number(workers, "workers", 1, MOST_WORKERS)
+    count = _cores() if workers is None else whole_number(workers, "workers", 1, MOST_WORKERS)
     if scheduler is not None:
         check_address(scheduler)
         if workers is not None:
@@ -189,7 +189,7 @@ Job = tuple[str, str]  # folder and digest of the sweep to which a task belongs
 Finish = Callable[[int, float, tuple[int, ...]], None]
 
 
-def cores() -> int:
+def _cores() -> int:
     """Number of processors that this process may use."""
     with suppress(AttributeError):  # the function does not exist on all systems
         return len(os.sched_getaffinity(0))

@@ -38,7 +38,7 @@ class BalancedMargins:
     def __init__(self, robot: Robot, wrenches: WrenchSet, model: CableModel, given: Sequence[Given] | None) -> None:
         """Prepare the robot without limits, and the loads. `given`: as in `inverse`."""
         self._given, self._names = given_codes(robot, given), given
-        self._robot, self._model, self._loads = robot, model, loads_of(wrenches)
+        self._robot, self._model, self._loads = robot, model, _loads_of(wrenches)
         self._unlimited = robot.replace(tension_min=0.0, tension_max=np.inf)
 
     def rows(self, poses: NDArray[np.float64]) -> Bracket:
@@ -117,7 +117,7 @@ def check_arguments(robot: Robot, orientations: Orientations, hull: str, moment_
         raise InvalidValueError("moment_arm", f"{moment_arm:g} m", f"None {allowed}", step)
 
 
-def loads_of(wrenches: WrenchSet) -> Array:
+def _loads_of(wrenches: WrenchSet) -> Array:
     """Middle and corners of a set of loads (L, 6), L <= MOST_LOADS. Ellipsoids and accelerations are refused."""
     item, allowed = "wrenches", "a box, or one polytope, of at most 64 corners for a robot with so few cables"
     step = "Give WrenchBox or WrenchPolytope; its corners and its middle are checked."

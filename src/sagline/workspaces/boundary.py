@@ -46,28 +46,22 @@ FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Boundary(Result):
-    """Boundary of a set of positions, with volume and components: the result of `boundary`.
+    """Boundary of a set of positions, with volume and components: the result of `boundary`."""
 
-    Attributes:
-        surface: The boundary, closed along the faces of the box. Vertices that are not on a face of the box are on the
-            boundary, with an error of at most 1e-10 of a cell.
-        volume: Volume of the set within the box [m^3]. The number is the volume that the surface encloses, plus the
-            volume between the flat triangles and the curved boundary.
-        volume_error: Error bound of the volume [m^3]. The bound neglects parts and gaps that are thinner than two cells
-            of the finest grid.
-        grid: Values of the function at the nodes of the grid before refinement.
-        components: Components of the set. Two parts are one component if a walk between them was found.
-        open_faces: Faces of the box that the set reaches, for example "x low". The set may continue beyond them.
-        evaluations: Number of positions at which the function was evaluated.
-    """
-
+    # The boundary, closed along the faces of the box. Vertices that are not on a face of the box are on the boundary,
+    # with an error of at most 1e-10 of a cell.
     surface: Surface
+    # Volume of the set within the box [m^3]. The number is the volume that the surface encloses, plus the volume
+    # between the flat triangles and the curved boundary.
     volume: float
+    # Error bound of the volume [m^3]. The bound neglects parts and gaps that are thinner than two cells of the finest
+    # grid.
     volume_error: float
-    grid: Grid
-    components: Components
+    grid: Grid  # values of the function at the nodes of the grid before refinement
+    components: Components  # two parts are one component if a walk between them was found
+    # Faces of the box that the set reaches, for example "x low". The set may continue beyond them.
     open_faces: tuple[str, ...]
-    evaluations: int
+    evaluations: int  # number of positions at which the function was evaluated
 
 
 def boundary(
@@ -258,27 +252,16 @@ PRECISE: Final = 1e-4  # precision for display, relative to the level at the nea
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Outline(Result):
-    """Boundary of a workspace for display, without error bar.
+    """Boundary of a workspace for display, without error bar."""
 
-    Attributes:
-        surface: The boundary, closed along the faces of the box.
-        margin: Margin at the vertices [N], shape (V,).
-        cable: Limiting cable at each vertex, -1 for none, shape (V,).
-        on_box: True for triangles on a face of the box, shape (F,).
-        open_faces: Faces of the robot's box that the workspace reaches, for example "x low".
-        volume: Volume [m^3], or area in a plane [m^2], enclosed by the triangles.
-        parts: Number of components, without a search for walks between components.
-        grid: The level at the nodes.
-    """
-
-    surface: Surface
-    margin: Array
-    cable: Indices
-    on_box: Flags
-    open_faces: tuple[str, ...]
-    volume: float
-    parts: int
-    grid: Grid
+    surface: Surface  # the boundary, closed along the faces of the box
+    margin: Array  # margin at the vertices [N], shape (V,)
+    cable: Indices  # limiting cable at each vertex, -1 for none, shape (V,)
+    on_box: Flags  # True for triangles on a face of the box, shape (F,)
+    open_faces: tuple[str, ...]  # faces of the robot's box that the workspace reaches, for example "x low"
+    volume: float  # volume [m^3], or area in a plane [m^2], enclosed by the triangles
+    parts: int  # number of components, without a search for walks between components
+    grid: Grid  # the level at the nodes
 
     @property
     def shares(self) -> dict[int, float]:

@@ -29,21 +29,14 @@ _HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the 27 nodes of a ce
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Grid(Result):
-    """Values of a function at the nodes of a grid.
+    """Values of a function at the nodes of a grid."""
 
-    Attributes:
-        x: Coordinates of the nodes [m], shape (nx,).
-        y: Coordinates of the nodes along y, shape (ny,).
-        z: Coordinates of the nodes along z, shape (nz,).
-        values: The function, >= 0 inside, shape (nx, ny, nz).
-        evaluated: True if the function was evaluated, shape (nx, ny, nz). Other nodes have the value of a neighbor, and
-            only its sign is valid.
-    """
-
-    x: Array
-    y: Array
-    z: Array
-    values: Array
+    x: Array  # coordinates of the nodes [m], shape (nx,)
+    y: Array  # coordinates of the nodes along y, shape (ny,)
+    z: Array  # coordinates of the nodes along z, shape (nz,)
+    values: Array  # the function, >= 0 inside, shape (nx, ny, nz)
+    # True if the function was evaluated, shape (nx, ny, nz). Other nodes have the value of a neighbor, and only its
+    # sign is valid.
     evaluated: Mask
 
     @property
@@ -132,19 +125,12 @@ def _grid(axes: list[Array], values: Array, evaluated: Mask, *, lock: bool = Tru
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """Net of triangles, with vertices on edges of the grid, or at nodes on the border of the grid.
+    """Net of triangles, with vertices on edges of the grid, or at nodes on the border of the grid."""
 
-    Attributes:
-        inner: For each vertex, the inside node of its edge, shape (V, 3).
-        outer: For each vertex, the outside node of its edge, shape (V, 3); equal to `inner` at the border.
-        faces: Vertices of each triangle, counterclockwise as seen from outside, shape (F, 3).
-        first: Index that each vertex had before equal vertices were merged, shape (V,).
-    """
-
-    inner: Indices
-    outer: Indices
-    faces: Indices
-    first: Indices
+    inner: Indices  # for each vertex, the inside node of its edge, shape (V, 3)
+    outer: Indices  # for each vertex, the outside node of its edge, shape (V, 3); equal to `inner` at the border
+    faces: Indices  # vertices of each triangle, counterclockwise as seen from outside, shape (F, 3)
+    first: Indices  # index that each vertex had before equal vertices were merged, shape (V,)
 
 
 def triangulate(inside: Mask) -> Net:
@@ -184,21 +170,13 @@ ITERATIONS = 100  # largest number of steps; bisection at a jump needs about 45,
 
 
 class Brackets(NamedTuple):
-    """Two positions on each of N rays, between which a function changes its sign.
+    """Two positions on each of N rays, between which a function changes its sign."""
 
-    Attributes:
-        inner: Position inside [m], shape (N, 3).
-        outer: Position outside [m].
-        at_inner: Function at `inner`, shape (N,).
-        at_outer: Function at `outer`.
-        found: True if the function changes its sign within the limit, shape (N,).
-    """
-
-    inner: Array
-    outer: Array
-    at_inner: Array
-    at_outer: Array
-    found: NDArray[np.bool_]
+    inner: Array  # position inside [m], shape (N, 3)
+    outer: Array  # position outside [m]
+    at_inner: Array  # function at `inner`, shape (N,)
+    at_outer: Array  # function at `outer`
+    found: NDArray[np.bool_]  # True if the function changes its sign within the limit, shape (N,)
 
     @property
     def k(self) -> Indices:

@@ -34,58 +34,40 @@ BLOCK: Final = 1 << 12  # poses per block; a block takes about 0.1 s, and interr
 
 
 class Details(NamedTuple):
-    """Levels and limiting criteria at N positions.
+    """Levels and limiting criteria at N positions."""
 
-    Attributes:
-        level: >= 0 inside, shape (N,).
-        margin: Margin of the loads, in the limiting rotation [N], shape (N,).
-        criterion: Index of the limiting criterion, shape (N,).
-        cable: Limiting cable, -1 for none, shape (N,).
-        rotation: Index of the limiting rotation, shape (N,).
-        uncertainty: Error bound of the level, shape (N,). The bound is 0 if the sign of the level is certain or another
-            criterion than the margin is limiting.
-    """
-
-    level: Array
-    margin: Array
-    criterion: Indices
-    cable: Indices
-    rotation: Indices
+    level: Array  # >= 0 inside, shape (N,)
+    margin: Array  # margin of the loads, in the limiting rotation [N], shape (N,)
+    criterion: Indices  # index of the limiting criterion, shape (N,)
+    cable: Indices  # limiting cable, -1 for none, shape (N,)
+    rotation: Indices  # index of the limiting rotation, shape (N,)
+    # Error bound of the level, shape (N,). The bound is 0 if the sign of the level is certain or another criterion than
+    # the margin is limiting.
     uncertainty: Array
 
 
 @dataclass(eq=False)
 class Levels:
-    """Level function: the smallest value of all criteria, each divided by its scale, at a position; >= 0 inside.
+    """Level function: the smallest value of all criteria, each divided by its scale, at a position; >= 0 inside."""
 
-    If the margin is negative, no tensions exist, and criteria on tensions are ignored. The level at a position is the
-    smallest level of all rotations, or the largest level if one feasible rotation is sufficient.
-
-    Attributes:
-        robot: The robot.
-        wrenches: Set of loads.
-        orientations: Orientations of the platform.
-        criteria: The criteria, the margin first.
-        model: Cable model.
-        tension: Tension distribution method.
-        moment_arm: Lever arm as in `margin` [m].
-        held: For a planar workspace, the normal axis and the coordinate of its plane [m]. Otherwise None.
-        on_block: Function that is called after each block with the number of poses in the block.
-        given: Given values of an underconstrained platform, as in `inverse`; None for its default.
-        hull: Margin to use: "exact" for its value, "inner" for its lower bound, "outer" for its upper bound.
-        middle: Middle of the wrench set, shape (6,); the tensions balance this wrench.
-    """
+    # If the margin is negative, no tensions exist, and criteria on tensions are ignored. The level at a position is the
+    # smallest level of all rotations, or the largest level if one feasible rotation is sufficient.
+    # `middle` is the middle of the wrench set, shape (6,); the tensions balance this wrench.
 
     robot: Robot
-    wrenches: WrenchSet
+    wrenches: WrenchSet  # set of loads
     orientations: Orientations
-    criteria: tuple[Criterion, ...]
+    criteria: tuple[Criterion, ...]  # the criteria, the margin first
     model: CableModel
     tension: TensionMethod
-    moment_arm: float | None
+    moment_arm: float | None  # lever arm as in `margin` [m]
+    # for a planar workspace, the normal axis and the coordinate of its plane [m]; otherwise None
     held: tuple[int, float] | None = None
+    # function that is called after each block with the number of poses in the block
     on_block: Callable[[int], None] | None = None
+    # margin to use: "exact" for its value, "inner" for its lower bound, "outer" for its upper bound
     hull: Hull = "exact"
+    # given values of an underconstrained platform, as in `inverse`; None for its default
     given: tuple[GivenValue, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -179,15 +161,10 @@ _IN_PLANE: Final = ((1, 2), (0, 2), (0, 1))  # horizontal and vertical axis of a
 
 
 class Plane(NamedTuple):
-    """A plane perpendicular to an axis of the world.
+    """A plane perpendicular to an axis of the world."""
 
-    Attributes:
-        normal: Index of the axis, 0 to 2.
-        at: Coordinate of the plane along the axis [m].
-    """
-
-    normal: int
-    at: float
+    normal: int  # index of the axis, 0 to 2
+    at: float  # coordinate of the plane along the axis [m]
 
     @property
     def axes(self) -> tuple[int, int]:
@@ -212,26 +189,16 @@ Find = Callable[[Array], Details]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slice:
-    """Levels and margins on a grid in a plane.
-
-    Attributes:
-        plane: The plane.
-        across: Coordinates of the columns [m], shape (C,).
-        up: Coordinates of the rows [m], shape (U,).
-        level: Level of each node, >= 0 in the workspace, shape (U, C).
-        margin: Signed margins [N], shape (U, C): negative if the loads are infeasible, -infinite if the robot is
-            singular.
-        criterion: Index of the limiting criterion, shape (U, C).
-        cable: Limiting cable, -1 for none, shape (U, C).
-    """
+    """Levels and margins on a grid in a plane."""
 
     plane: Plane
-    across: Array
-    up: Array
-    level: Array
+    across: Array  # coordinates of the columns [m], shape (C,)
+    up: Array  # coordinates of the rows [m], shape (U,)
+    level: Array  # level of each node, >= 0 in the workspace, shape (U, C)
+    # signed margins [N], shape (U, C): negative if the loads are infeasible, -infinite if the robot is singular
     margin: Array
-    criterion: Indices
-    cable: Indices
+    criterion: Indices  # index of the limiting criterion, shape (U, C)
+    cable: Indices  # limiting cable, -1 for none, shape (U, C)
 
 
 def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int, int]) -> Slice:

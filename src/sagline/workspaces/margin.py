@@ -36,23 +36,14 @@ _CATENARY = Catenary()
 
 
 class Bracket(NamedTuple):
-    """Margins of N poses with their bounds. `Margin` has the same fields, and also the robot and the poses.
+    """Margins of N poses with their bounds. `Margin` has the same fields, and also the robot and the poses."""
 
-    Attributes:
-        value: Continuous margin between `low` and `high` [N], (N,).
-        low: Lower bound of the margin for all sag forces [N], (N,).
-        high: Upper bound [N], (N,).
-        cable: Cable whose limit has the largest effect on the value, -1 for none, (N,).
-        status: Codes of `MarginStatus`, (N,).
-        direction: Normal of the nearest facet, (N, 6).
-    """
-
-    value: Array
-    low: Array
-    high: Array
-    cable: Indices
-    status: Codes
-    direction: Array
+    value: Array  # continuous margin between `low` and `high` [N], (N,)
+    low: Array  # lower bound of the margin for all sag forces [N], (N,)
+    high: Array  # upper bound [N], (N,)
+    cable: Indices  # cable whose limit has the largest effect on the value, -1 for none, (N,)
+    status: Codes  # codes of `MarginStatus`, (N,)
+    direction: Array  # normal of the nearest facet, (N, 6)
 
 
 class MarginRows:

@@ -201,25 +201,17 @@ AXES: Final = "xyz"
 
 
 class Region(NamedTuple):
-    """Region of positions, with the number of cells of its grid.
+    """Region of positions, with the number of cells of its grid."""
 
-    Attributes:
-        box: The given box, or the robot's own box.
-        low: Lowest corner of the region [m], shape (3,).
-        high: Highest corner [m], above the lowest corner along every axis.
-        flat: Index of the axis along which the box has no extent; None if it has an extent along all axes. With a flat
-            axis, the positions are in a plane, and the region has a thickness. The area is the volume of the region
-            divided by the thickness.
-        thickness: Thickness of the region along the flat axis [m]; 1 without a flat axis.
-        cells: Number of cells along each axis.
-    """
-
-    box: PoseBox
-    low: Array
-    high: Array
+    box: PoseBox  # the given box, or the robot's own box
+    low: Array  # lowest corner of the region [m], shape (3,)
+    high: Array  # highest corner [m], above the lowest corner along every axis
+    # Index of the axis along which the box has no extent; None if it has an extent along all axes. With a flat axis,
+    # the positions are in a plane, and the region has a thickness. The area is the volume of the region divided by the
+    # thickness.
     flat: int | None
-    thickness: float
-    cells: tuple[int, int, int]
+    thickness: float  # thickness of the region along the flat axis [m]; 1 without a flat axis
+    cells: tuple[int, int, int]  # number of cells along each axis
 
     @property
     def unit(self) -> str:
