@@ -38,7 +38,7 @@ def poses_of(robot: Robot, poses: PoseLike | None, box: PoseBox | None, grid: Se
         if box is not None:
             raise InvalidValueError("box", "given with poses", "one of the two", "Leave one of them out.")
         given = pose_of(poses, "poses")
-        batch = given if given.shape else Pose.from_quaternion(given.position[None], given.quaternion[None])
+        batch = given if given.shape else pose_of([given])
         if not 0 < len(batch) <= MOST:
             raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give at least one pose.")
     else:

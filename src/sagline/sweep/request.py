@@ -116,7 +116,7 @@ class Request(Result):
         machines = listed(robots, Robot, "robots")
         batch = pose_of(poses, "poses")
         if not batch.shape:
-            batch = Pose.from_quaternion(batch.position[None], batch.quaternion[None])
+            batch = pose_of([batch])
         loads = np.atleast_2d(checked(np.zeros(6) if wrenches is None else wrenches, "wrenches", "N, N m", shape=(6,)))
         if loads.ndim > 2:
             raise InvalidValueError("wrenches", f"of shape {loads.shape}", "shape (6,) or (W, 6)", "Reshape to (W, 6).")

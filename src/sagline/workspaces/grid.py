@@ -103,7 +103,7 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
         cells = _crossed_cells(fine.inside, _HALVED, 2)
 
 
-def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
+def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...], stride: int) -> Mask:
     """Mask of the cells that the boundary crosses: they have nodes inside and nodes outside."""
     parts = list(_views(inside, nodes, stride))
     return np.asarray(np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts))
