@@ -70,17 +70,14 @@ def session(folder: Path) -> Iterator[Compared]:
     )
     away = np.linalg.norm(found.pose.position[0] - given.first.position)
     yield Compared("first position from lengths, distance from the authors' estimate", "", f"{1e3 * away:.1f} mm")
-    # a calibration has no horizontal swivel axes: cables from the entries of the pulleys, with their lengths
-    entries = given.robot.replace(winches=None)
-    shorter = sl.inverse(entries, found.pose.position).unstrained_length - balance.unstrained_length
     log = sl.WinchLog(
-        unstrained_length=given.lengths + shorter,
+        unstrained_length=given.lengths,
         load_cells=given.load_cells,
         commanded=found.pose,
         sensors=sl.Sensors(length_deviation=LENGTH_DEVIATION, tension_deviation=CELL_DEVIATION),
     )
     start = perf_counter()
-    fit = sl.calibrate(entries, log, ["length_zero", "load_cell_gain", "load_cell_bias"], folds=0)
+    fit = sl.calibrate(given.robot, log, ["length_zero", "load_cell_gain", "load_cell_bias"], folds=0)
     duration = perf_counter() - start
     first = fit.poses.position[int(np.argmin(fit.rows))]
     yield Compared(

@@ -17,6 +17,7 @@ from sagline.core.arrays import Array
 from tests.kinematics.test_slanted import AXES, with_axes
 
 POSES, REPEATS = 2000, 7
+STEP = 20  # of the poses of a calibration
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 ROBOTS = {
     "vertical": with_axes([0.0, 0.0, 1.0]),
@@ -29,7 +30,8 @@ TARGETS = {
     "forward, no start pose": "≤ 1.5 x vertical",
     "inverse": "≤ 2.5 x vertical",
     "inverse without stability": "≤ 2.5 x vertical",
-    "stiffness and sensitivities": "",
+    "stiffness and sensitivities": "≤ 1.5 x vertical",
+    "calibration of 100 poses with lengths and load cells": "≤ 1.5 x vertical",
 }
 
 
@@ -45,6 +47,13 @@ def calls(robot: sl.Robot) -> dict[str, Callable[[], object]]:
     path = pose_at(np.column_stack((radius * np.cos(angle), radius * np.sin(angle), np.full(POSES, 2.0))))
     near, plan = pose_at(path.position + 0.02), sl.inverse(robot, path)
     lengths, state = plan.unstrained_length, plan.state
+    noise = np.random.default_rng(1).normal(size=(2, *lengths[::STEP].shape))
+    log = sl.WinchLog(
+        unstrained_length=lengths[::STEP] + 1e-3 * noise[0],
+        load_cells=state.cables.frame_end_tension[::STEP] + 5.0 * noise[1],
+        commanded=path[::STEP],
+        sensors=sl.Sensors(1e-3, 5.0),
+    )
     return {
         "forward, steps of 2 mm": lambda: sl.forward(robot, lengths, path[0]),
         "forward, start pose wrong by 35 mm": lambda: sl.forward(robot, lengths, near),
@@ -52,6 +61,7 @@ def calls(robot: sl.Robot) -> dict[str, Callable[[], object]]:
         "inverse": lambda: sl.inverse(robot, path),
         "inverse without stability": lambda: sl.inverse(robot, path, stability=False),
         "stiffness and sensitivities": lambda: sl.stiffness(state),
+        "calibration of 100 poses with lengths and load cells": lambda: sl.calibrate(robot, log, folds=0),
     }
 
 
@@ -65,7 +75,7 @@ def times() -> Iterator[Row]:
                 start = time.process_time()
                 each[quantity]()
                 best[name] = min(best[name], time.process_time() - start)
-        poses = POSES / 10 if "no start" in quantity else POSES
+        poses = POSES / 10 if "no start" in quantity else POSES / STEP if "calibration" in quantity else POSES
         texts = [f"{name} {1e6 * t / poses:.3g} µs ({t / best['vertical']:.2f} x)" for name, t in best.items()]
         yield Row(quantity, target, "; ".join(texts))
 

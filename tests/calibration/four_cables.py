@@ -21,6 +21,7 @@ CENTER: Final = np.array([0.0, 0.0, 0.02])  # m
 STIFFNESS: Final = 6e4  # N
 DENSITY: Final = 0.006  # kg/m
 GRAVITY: Final = 9.81  # m/s^2
+AXES: Final = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])  # toward the platform
 POSES: Final = 27
 LENGTH_NOISE: Final = 2e-3  # m
 CELL_NOISE: Final = 2.0  # N
@@ -40,6 +41,7 @@ class Twin(NamedTuple):
     zeros: Array
     gain: Array
     bias: Array
+    radius: float = 0.0  # of the pulleys [m], with the swivel axes `AXES`; 0 for eyelets
 
 
 def drawn_robot(**changes: Any) -> sl.Robot:
@@ -94,15 +96,30 @@ def cable_vectors(force: Array, length: Array, stiffness: float) -> tuple[Array,
     return np.column_stack((force[:, :2] * along[:, None], rise)), tension
 
 
+def pulleys_at(twin: Twin, force: Array, length: Array) -> tuple[Array, Array, Array]:
+    """Exit points [m] (4, 3), unstrained lengths on the pulleys [m], and unit vectors from the axes to their centers.
+
+    A pulley is in the plane of its axis and of the cable, whose force on the pulley has a moment about no other axis.
+    """
+    pull = -force - np.outer(DENSITY * GRAVITY * length, [0.0, 0.0, 1.0])
+    tension, along = np.linalg.norm(pull, axis=1), np.sum(pull * AXES, axis=1)
+    outward = pull - along[:, None] * AXES
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    wrap = np.arccos(along / tension)
+    points = twin.radius * ((1.0 - np.cos(wrap))[:, None] * outward + np.sin(wrap)[:, None] * AXES)
+    return twin.frame + points, twin.radius * wrap / (1.0 + tension / twin.stiffness), outward
+
+
 def residuals(unknown: Array, twin: Twin, place: Array) -> Array:
     """Gaps of the cables [m], and force and moment about the center of mass divided by the weight, (18,).
 
-    unknown: roll, pitch [rad], lengths [m], forces [N]; place: x, y, z [m] and yaw [rad].
+    unknown: roll, pitch [rad], lengths of the free spans [m], forces [N]; place: x, y, z [m] and yaw [rad].
     """
     turn = turn_of(unknown, place)
     force = unknown[6:].reshape(4, 3)
     ends = place[:3] + PLATFORM @ turn.T
-    gaps = ends + cable_vectors(force, unknown[2:6], twin.stiffness)[0] - twin.frame
+    exits = pulleys_at(twin, force, unknown[2:6])[0] if twin.radius else twin.frame
+    gaps = ends + cable_vectors(force, unknown[2:6], twin.stiffness)[0] - exits
     arms = ends - place[:3] - turn @ twin.center
     weight = twin.mass * GRAVITY
     balance = np.concatenate((force.sum(axis=0) - [0.0, 0.0, weight], np.cross(arms, force).sum(axis=0)))
@@ -153,8 +170,11 @@ def log_with_inclinations(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl
     return log, angles
 
 
-def log_with_poses(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl.WinchLog, Array, Array]:
-    """The log of `log_of_twin`, yaw, pitch and roll of the twin (N, 3) [rad], and its position (N, 3) [m]."""
+def log_with_poses(twin: Twin, seed: int, poses: int = POSES, noise: float = 1.0) -> tuple[sl.WinchLog, Array, Array]:
+    """The log of `log_of_twin`, yaw, pitch and roll of the twin (N, 3) [rad], and its position (N, 3) [m].
+
+    noise: factor of the usual noise.
+    """
     rng = np.random.default_rng((seed, 1))
     lengths: list[Array] = []
     cells: list[Array] = []
@@ -169,8 +189,9 @@ def log_with_poses(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl.WinchL
         tension = cable_vectors(found[6:].reshape(4, 3), found[2:6], twin.stiffness)[1]
         if tension.min() < LEAST:
             continue
-        lengths.append(found[2:6] - twin.zeros + LENGTH_NOISE * rng.normal(size=4))
-        cells.append(twin.gain * tension + twin.bias + CELL_NOISE * rng.normal(size=4))
+        on_pulley = pulleys_at(twin, found[6:].reshape(4, 3), found[2:6])[1] if twin.radius else 0.0
+        lengths.append(found[2:6] + on_pulley - twin.zeros + noise * LENGTH_NOISE * rng.normal(size=4))
+        cells.append(twin.gain * tension + twin.bias + noise * CELL_NOISE * rng.normal(size=4))
         angles = np.array([place[3], found[1], found[0]])
         turned.append(angles)
         placed_at.append(place[:3])
@@ -180,6 +201,6 @@ def log_with_poses(twin: Twin, seed: int, poses: int = POSES) -> tuple[sl.WinchL
         unstrained_length=np.array(lengths),
         load_cells=np.array(cells),
         commanded=sl.Pose(placed[:, :3], Rotation.from_euler("ZYX", placed[:, 3:])),
-        sensors=sl.Sensors(LENGTH_NOISE, CELL_NOISE),
+        sensors=sl.Sensors(noise * LENGTH_NOISE, noise * CELL_NOISE),
     )
     return log, np.array(turned), np.array(placed_at)

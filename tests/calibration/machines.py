@@ -50,6 +50,9 @@ def robots() -> dict[str, sl.Robot]:
     cell = {"load_cell_gain": few, "load_cell_bias": 20.0 * few - 18.0}
     run = {"dead_cable": 3.0 * few, "dead_rise": 2.0 * few - 1.0}
     swivel = np.outer([1.0, -1.0] * 4, [0.0, 0.0, 1.0])
+    axes = np.random.default_rng(5).normal(size=(8, 3))
+    axes[0], axes[1] = [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]
+    slanted = {"swivel_axis": axes / np.linalg.norm(axes, axis=1)[:, None]}
     pulleys = sl.load_robot("ipanema-2")
     layers = {"drum_width": 0.08, "layers": 4, "drum_distance": 0.8, "drum_offset": -0.04, "cable_length": 34.0}
     cogiro = sl.load_robot("cogiro")
@@ -59,6 +62,7 @@ def robots() -> dict[str, sl.Robot]:
         "planar": planar(),
         "point": point(),
         "pulleys": pulleys.replace(winches=sl.Winch(0.25 * few, swivel_axis=swivel, **run, **cell)),
+        "slanted": cogiro.replace(winches=sl.Winch(0.05 * few, **slanted, **run, **cell)),
         "drums": with_drums(cogiro, winding_tension=160.0, **cell),
         "layers": with_drums(cogiro, pulley_radius=0.05 * few, winding_tension=40.0, **run, **layers),
     }

@@ -35,7 +35,7 @@ DRAWN = np.diag([0.2, 0.3, 0.4])  # kg m^2
 FOUND = sl.CalibrationStatus.FOUND
 
 
-@pytest.mark.parametrize("name", wide(["pulleys", "cogiro", "article-suspended"]))
+@pytest.mark.parametrize("name", wide(["pulleys", "slanted", "cogiro", "article-suspended"]))
 def test_slopes_are_those_of_the_equilibrium(name: str) -> None:
     machine, pose, lengths = standing(robots()[name])
     robot, sensors = machine.robot, sl.Sensors(frequency_deviation=1.0)

@@ -25,18 +25,35 @@ FOUND = sl.CalibrationStatus.FOUND
 
 def directions(robot: sl.Robot, lengths: Array, start: sl.Pose) -> Array:
     """Swivel angles (N, m) [rad] of a robot in equilibrium, by their definition."""
-    reach = sl.forward(robot, lengths, start).pose.transform(robot.platform_anchors) - robot.frame_anchors
+    state = sl.forward(robot, lengths, start).state
+    reach = state.pose.transform(robot.platform_anchors) - robot.frame_anchors
     axis = np.array([0.0, 0.0, 1.0]) if robot.winches is None else robot.winches.swivel_axis
-    return np.asarray(np.sign(np.broadcast_to(axis, robot.frame_anchors.shape)[:, 2]) * np.arctan2(*reach.T[1::-1]).T)
+    if robot.winches is None or (np.abs(axis[:, 2]) == 1.0).all():
+        sense = np.sign(np.broadcast_to(axis, robot.frame_anchors.shape)[:, 2])
+        return np.asarray(sense * np.arctan2(*reach.T[1::-1]).T)
+    return np.stack(
+        [
+            angle_about(n, p)
+            for n, p in zip(axis, np.moveaxis(state.exit_point, 1, 0) - robot.frame_anchors[:, None], strict=True)
+        ],
+        axis=1,
+    )
 
 
-@pytest.mark.parametrize("name", wide(["pulleys", "cogiro", "article-suspended"]))
+def angle_about(axis: Array, vectors: Array) -> Array:
+    """Angles (N,) [rad] of vectors (N, 3) about an axis: 0 toward x, or up for an axis within 45 degrees of x."""
+    zero = np.eye(3)[2 if abs(axis[0]) > np.sqrt(0.5) else 0]
+    return np.asarray(np.arctan2(vectors @ np.cross(axis, zero), vectors @ np.cross(np.cross(axis, zero), axis)))
+
+
+@pytest.mark.parametrize("name", wide(["pulleys", "slanted", "cogiro", "article-suspended"], 2))
 def test_slopes_are_those_of_the_equilibrium(name: str) -> None:
     machine, pose, lengths = standing(robots()[name])
     robot = machine.robot
     sensors = sl.Sensors(swivel_deviation=1.0)
     kinds = ["frame_anchors", "platform_anchors", "axial_stiffness", "linear_density", "mass", "center_of_mass"]
-    kinds += ["swivel_zero", "pulley_radius"] if robot.winches is not None else ["swivel_zero"]
+    kinds += ["length_zero"]
+    kinds += ["swivel_zero", "pulley_radius", "dead_cable"] if robot.winches is not None else ["swivel_zero"]
     asked = parameters_of(robot, kinds, sensors, counted=False)
     rows, m = reference.pose_rows(pose), robot.cable_count
     by_values, by_length = unwhitened_slopes(MachineTerms.of(robot, sl.Catenary(), asked, sensors), rows, lengths)
@@ -50,6 +67,8 @@ def test_slopes_are_those_of_the_equilibrium(name: str) -> None:
     zero = asked.labels.index("swivel_zero[1]")
     np.testing.assert_allclose(by_values[:, m + 6 :, zero], np.tile(np.eye(m)[1], (len(rows), 1)), atol=1e-15)
     for cable in range(m):
+        offset = by_values[:, m + 6 :, asked.labels.index(f"length_zero[{cable}]")]
+        np.testing.assert_allclose(offset, by_length[:, m + 6 :, cable], rtol=1e-6, atol=1e-9)
         step = 1e-5 * np.eye(m)[cable]
         wanted = (directions(robot, lengths + step, pose) - directions(robot, lengths - step, pose)) / 2e-5
         np.testing.assert_allclose(by_length[:, m + 6 :, cable], wanted, rtol=2e-5, atol=2e-6)

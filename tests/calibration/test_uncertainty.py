@@ -30,6 +30,7 @@ OVER_PULLEYS = {"pulley_radius": 2e-4, "dead_cable": 2e-3, "load_cell_gain": 0.0
 WITH: dict[str, dict[str, Any]] = {
     "cogiro": {},
     "pulleys": OVER_PULLEYS,
+    "slanted": OVER_PULLEYS,
     "layers": {**OVER_PULLEYS, "drum_radius": 2e-5},
     "drums": {},
     "planar": {},

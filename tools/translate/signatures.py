@@ -181,6 +181,7 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
         ),
     },
     "spectral_matrices": {"": (F2, FLOAT, RULE, F3, F3, F3, F3, F2)},
+    "swivel_readings": {"": (FORWARD_PULLEYS, GIVEN, MEMORY, F3)},
     "starting_lengths": {"": (TERMS, F2, F2, F1, F2, F2, MEMORY, F2)},
     "stretch_matrices": {"": (F2, FLOAT, RULE, F3, F3)},
     "structure_matrices": {"": (F3, F3)},

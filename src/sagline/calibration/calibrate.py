@@ -42,7 +42,6 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted, n
 from sagline.core.progress import Progress
 from sagline.kernels import codes
-from sagline.robot.batch import refuse_slanted
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
 
@@ -184,7 +183,6 @@ def _check_model(robot: Robot, model: CableModel) -> None:
     if model.code not in (codes.CATENARY, codes.ELASTIC, codes.STRAIGHT):
         step = "Use Catenary(), or Straight() for a fit of the geometry alone."
         raise InvalidValueError("model", type(model).__name__, "Catenary(), Elastic() or Straight()", step)
-    refuse_slanted(robot)
     if robot.winches is not None and robot.winches.guides is not None:
         step = "Give dead_cable, the whole guided length, instead of guides."
         raise InvalidValueError("winches: guides", "given", "None for calibrate", step)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels import tables
+from sagline.kernels.cable.swivel import DATA
 from sagline.kernels.calibration import kinds
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.platform import ForwardTerms
@@ -21,7 +22,7 @@ from sagline.kinematics.forward_rows import ForwardRows, new_chain
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import KernelStates
 from sagline.statics.stiffness import natural_frequency
-from sagline.statics.tables import body_table, cable_table
+from sagline.statics.tables import body_table
 
 
 class FurtherRows(NamedTuple):
@@ -32,17 +33,33 @@ class FurtherRows(NamedTuple):
     by_length: Array  # derivatives by the true lengths, at equilibrium, (N, E, m)
 
 
-def swivel_angles(robot: Robot, poses: Array) -> Array:
-    """Swivel angles (N, m) [rad] at pose rows: angle of the plane of each cable about its vertical swivel axis."""
-    # The angle of a cable along x is 0. A positive angle is a positive rotation about the swivel axis.
-    reach = _reach(robot, poses)[0]
-    return np.asarray(swivel_senses(robot) * np.arctan2(reach[..., 1], reach[..., 0]))
-
-
-def swivel_senses(robot: Robot) -> Array:
-    """Signs (m,): 1 for a swivel axis that points up, -1 for an axis that points down."""
+def swivel_axes(robot: Robot) -> Array:
+    """Unit vectors (m, 3) of the swivel axes, in the directions in which the cables enter the pulleys."""
     axis = np.array([0.0, 0.0, 1.0]) if robot.winches is None else robot.winches.swivel_axis
-    return np.where(np.broadcast_to(axis, (robot.cable_count, 3))[:, 2] < 0.0, -1.0, 1.0)
+    return np.broadcast_to(axis, (robot.cable_count, 3))
+
+
+def _zero_directions(robot: Robot) -> Array:
+    """Unit vectors normal to the swivel axes at the angles 0 and 90 degrees, (2, m, 3)."""
+    # A cable at angle 0 is on the side of x of its axis; for an axis within 45 degrees of x, it is on the upper side.
+    axes = swivel_axes(robot)
+    toward = np.where(axes[:, :1] ** 2 > 0.5, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
+    first = toward - np.sum(toward * axes, axis=1, keepdims=True) * axes
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack((first, np.cross(axes, first)))
+
+
+def swivel_angles(robot: Robot, poses: Array) -> Array:
+    """Swivel angles (N, m) [rad] at pose rows: angle of the half-plane of each swivel axis and platform end."""
+    # A positive angle is a positive rotation about the swivel axis. A cable with a vertical axis is in this half-plane;
+    # with another axis, the weight of the cable turns the pulley a little.
+    return _angles_about(_reach(robot, poses)[0], _zero_directions(robot))
+
+
+def _angles_about(vectors: Array, zero: Array) -> Array:
+    """Angles (N, m) [rad] of vectors (N, m, 3) about the swivel axes."""
+    along, across = (np.sum(vectors * direction, axis=2) for direction in zero)
+    return np.asarray(np.arctan2(across, along))
 
 
 def _reach(robot: Robot, poses: Array) -> tuple[Array, Array, Array]:
@@ -60,29 +77,40 @@ def swivel_rows(
     where: Indices,
     scale: Array,
     motion: tuple[Array, Array],
+    paid: Array,
+    turned: Array | None,
 ) -> FurtherRows:
     """Residuals and derivatives of swivel angles."""
     # zeros: `swivel_zero` of the cables (m,) [rad]. where, scale: as in `kernels.calibration.terms.Unknowns`. motion:
     # derivatives of origin and rotation vector of the platform by the parameters (N, 6, P) and by the lengths (N, 6,
-    # m).
-    (reach, levers, matrix), m = _reach(robot, poses), robot.cable_count
-    square = reach[..., 0] ** 2 + reach[..., 1] ** 2
-    by_end = np.zeros(reach.shape)
-    by_end[..., 0], by_end[..., 1] = -reach[..., 1] / square, reach[..., 0] / square
-    by_end *= swivel_senses(robot)[:, None]
+    # m). paid: derivatives of the lengths by the parameters (N, m, P). turned: result of `swivel_readings`, None if all
+    # axes are vertical.
+    (reach, levers, matrix), m, zero = _reach(robot, poses), robot.cable_count, _zero_directions(robot)
+    if turned is None:
+        along, across = (np.sum(reach * direction, axis=2)[..., None] for direction in zero)
+        by_end, by_data = (
+            (along * zero[1] - across * zero[0]) / (along**2 + across**2),
+            np.zeros((*along.shape[:2], DATA)),
+        )
+    else:
+        reach, by_end, by_data = turned[..., :3], turned[..., 3:6], turned[..., 6:]
     by_pose = np.concatenate((by_end, np.cross(levers, by_end)), axis=2)
     slopes, by_length = by_pose @ motion[0], by_pose @ motion[1]
+    if turned is not None:
+        slopes += by_data[..., :1] * paid
+        by_length += by_data[..., :1] * np.eye(m)
     by_anchor = by_end @ matrix
     for i in range(m):
         direct: list[tuple[int, Array | float]] = [(kinds.SWIVEL, 1.0)]
         direct += [(kinds.FRAME + axis, -by_end[:, i, axis]) for axis in range(3)]
         direct += [(kinds.PLATFORM + axis, by_anchor[:, i, axis]) for axis in range(3)]
+        direct += [(kinds.DENSITY + k, by_data[:, i, 1 + k]) for k in range(DATA - 1)]
         for row, change in direct:
             if where[row, i] >= 0:
                 slopes[:, i, where[row, i]] += scale[row, i] * change
     residual = np.zeros(reach.shape[:2])
     if readings is not None:
-        residual = _wrapped(readings - swivel_angles(robot, poses) - zeros)
+        residual = _wrapped(readings - _angles_about(reach, zero) - zeros)
     return FurtherRows(residual, slopes, by_length)
 
 
@@ -111,6 +139,7 @@ class _PlatformArrays(NamedTuple):
 def _natural_frequencies(terms: ForwardTerms, freedom: Array, at: _PlatformArrays) -> Array:
     """Natural frequencies (B, n) [Hz] of platforms on massless cables, ascending; NaN for an unstable motion."""
     (count, m), size = at.lengths.shape, tables.RESULT_ROWS if terms[-1] else tables.BARE_ROWS
+    size = tables.SWIVEL_ROWS if at.cables.shape[2] > tables.CABLE_COLUMNS else size
     robots, memory = (freedom, locked(at.bodies), locked(at.cables)), memory_for(m)
     found = ForwardRows(
         np.empty((count, tables.POSE_COLUMNS)),
@@ -135,6 +164,7 @@ def _natural_frequencies(terms: ForwardTerms, freedom: Array, at: _PlatformArray
 def frequency_rows(
     robot: Robot,
     terms: ForwardTerms,
+    cables: Array,
     readings: Array,
     poses: Array,
     lengths: Array,
@@ -145,7 +175,7 @@ def frequency_rows(
 ) -> FurtherRows:
     """Residuals and derivatives of the K lowest natural frequencies, matched with the readings by their order."""
     # The derivatives are central differences between equilibria. paid: derivatives of the lengths by the parameters (N,
-    # m, P). steps: of the P parameters. Other arguments: as in `swivel_rows`.
+    # m, P). steps: of the P parameters. cables: cable_table. Other arguments: as in `swivel_rows`.
     (count, modes), m, width = readings.shape, lengths.shape[1], paid.shape[2]
     rows = np.flatnonzero(~np.isnan(readings).all(axis=1) & np.isfinite(lengths).all(axis=1))
     found = FurtherRows(np.full((count, modes), np.nan), np.zeros((count, modes, width)), np.zeros((count, modes, m)))
@@ -156,7 +186,7 @@ def frequency_rows(
     samples = len(rows) * (1 + 2 * len(sizes))
     longer = np.concatenate((np.zeros((len(rows), m, 1)), longer, -longer), axis=2).transpose(2, 0, 1).reshape(-1, m)
     at = _PlatformArrays(
-        np.tile(cable_table(robot), (samples, 1, 1)),
+        np.tile(cables, (samples, 1, 1)),
         np.tile(body_table(robot), (samples, 1)),
         np.tile(robot.inertia, (samples, 1, 1)),
         np.tile(poses[rows], (1 + 2 * len(sizes), 1)),

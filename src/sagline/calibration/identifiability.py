@@ -13,13 +13,14 @@ import numpy as np
 from scipy.linalg import null_space
 
 from sagline.calibration.findings import Direction
-from sagline.calibration.further import swivel_senses
+from sagline.calibration.further import swivel_axes
 from sagline.calibration.least_squares import left_jacobian
 from sagline.calibration.log import Sensors
 from sagline.calibration.parameters import Parameters, PriorUnits
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds
+from sagline.robot.batch import has_slanted_axes
 from sagline.robot.drum import Drums
 from sagline.robot.robot import Robot
 
@@ -252,8 +253,9 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[_Genera
     up = np.array([0.0, 0.0, 1.0])
     turned = np.linalg.solve(left_jacobian(turn), up)[:, None]
     moved: list[tuple[Any, Array | float]] = [(_FRAME, np.cross(up, robot.frame_anchors).T), (_TURN, turned)]
-    moved += [(_SHIFT, np.cross(up, place)[:, None]), (kinds.SWIVEL, -swivel_senses(robot))]
-    yield generator("the world turned about the vertical", _YAW, *moved)
+    moved += [(_SHIFT, np.cross(up, place)[:, None]), (kinds.SWIVEL, -swivel_axes(robot)[:, 2])]
+    if not has_slanted_axes(robot):  # the directions of these axes are known
+        yield generator("the world turned about the vertical", _YAW, *moved)
     for axis, unit in zip("xyz", np.eye(3), strict=True):  # rotations and shifts about the center of mass
         anchors, target = np.cross(unit, robot.platform_anchors - center).T, np.cross(unit, sensors.target - center)
         changes = ((_PLATFORM, anchors), (_TARGET, target[:, None]))

@@ -172,7 +172,8 @@ class WinchLog(_Replaceable, Saved, Tabular):
         commanded: N commanded poses, near the actual poses; or None.
         sensors: Standard deviations of all readings; None for `Sensors()`, which contains only lengths.
         swivel: Measured swivel angles of the pulleys [rad], relative to unknown zeros, shape (N, m), NaN if missing; or
-            None. The angle is the direction of the cable about its swivel axis, 0 along x.
+            None. The angle is that of the pulley about its swivel axis: 0 toward x, or upward for an axis within 45
+            degrees of x.
         frequency: Lowest natural frequencies of the platform [Hz], ascending, shape (N, K), NaN if missing; or None.
         source: Text that states the origin of the readings, such as a file name.
 

@@ -14,8 +14,9 @@ from sagline.calibration.log import Sensors, load_cells_of, measures_yaw, readin
 from sagline.calibration.parameters import Parameters, slopes_of_values
 from sagline.core.arrays import Array, kernel_input, locked
 from sagline.core.progress import blocks
+from sagline.kernels import tables
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.observe import observe
+from sagline.kernels.calibration.observe import SWIVEL_NUMBERS, observe, swivel_readings
 from sagline.kernels.calibration.terms import BESIDE, PoseReadings, SensingArrays
 from sagline.kernels.forward.platform import ForwardTerms
 from sagline.kernels.memory import memory_for
@@ -23,7 +24,7 @@ from sagline.robot.batch import has_routing
 from sagline.robot.drum import Drums
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.tables import body_table, cable_table, pose_rows, slanted_rows
 
 STEP: Final = 1e-4  # relative step of a drum radius or length zero for difference quotients; lengths are nearly linear
 # length_zero, drum_radius, axial_stiffness, length_scale and clock_offset, as in `kernels.calibration.observe`
@@ -149,7 +150,7 @@ class MachineTerms(NamedTuple):
             Drums.of(robot) if parameters.counted else None,
             (model.code, *model.parameters, has_routing(robot) or None),
             body_table(robot),
-            cable_table(robot),
+            cable_table(robot, slanted=True),
             _sensor_arrays(robot, sensors),
             np.zeros(0),
         )
@@ -158,8 +159,17 @@ class MachineTerms(NamedTuple):
     def with_parameters(self, parameters: Parameters) -> MachineTerms:
         """The machine with other unknowns. Unknown pulley radii and dead lengths need routing, even if zero."""
         routed = self.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
-        terms = (*self.terms[:-1], routed or None)
-        return self._replace(parameters=parameters, terms=terms, slopes=slopes_of_values(self.robot, parameters))
+        terms, cables, winches = (*self.terms[:-1], routed or None), self.cables, self.robot.winches
+        radii = (parameters.where[kinds.RADIUS] >= 0).any()
+        if (
+            radii
+            and winches is not None
+            and cables.shape[2] == tables.CABLE_COLUMNS
+            and winches.swivel_axis[:, :2].any()
+        ):
+            cables = locked(slanted_rows(self.robot)[None])  # eyelets that may become pulleys
+        slopes = slopes_of_values(self.robot, parameters)
+        return self._replace(parameters=parameters, terms=terms, cables=cables, slopes=slopes)
 
     def with_sensors(self, sensors: Sensors) -> MachineTerms:
         """The machine with other sensors."""
@@ -242,18 +252,18 @@ def _with_further(
     motion = moves.matrix[:, m:], np.swapaxes(moves.back, 1, 2)[:, m:] / EXACT**2
     factor = machine.slopes if direction is None else machine.slopes * direction
     scale, places = np.where(where >= 0, factor[where], 0.0), where if direction is None else np.minimum(where, 0)
-    parts, modes = [], 0
+    parts, modes, paid = [], 0, np.zeros((len(poses), m, motion[0].shape[2]))
+    for row, change in zip((*LENGTH_KINDS,), slopes, strict=True):
+        for i in np.flatnonzero(places[row] >= 0):
+            paid[:, i, places[row, i]] += scale[row, i] * change[:, i]
     if sensors.swivel_deviation is not None:
-        swivels = machine.swivel_zero, readings.swivels
-        parts.append(swivel_rows(machine.robot, *swivels, poses, places, scale, motion))
+        swivels, turned = (machine.swivel_zero, readings.swivels), _turned_pulleys(machine, poses, lengths)
+        parts.append(swivel_rows(machine.robot, *swivels, poses, places, scale, motion, paid, turned))
     if readings.frequencies is not None:
-        modes, paid = readings.frequencies.shape[1], np.zeros((len(poses), m, motion[0].shape[2]))
-        for row, change in zip((*LENGTH_KINDS,), slopes, strict=True):
-            for i in np.flatnonzero(places[row] >= 0):
-                paid[:, i, places[row, i]] += scale[row, i] * change[:, i]
+        modes = readings.frequencies.shape[1]
         at = poses, lengths, places, scale, paid
         steps = _steps(machine) if direction is None else 1.0 / np.abs(direction / _steps(machine)).max(keepdims=True)
-        parts.append(frequency_rows(machine.robot, machine.terms, readings.frequencies, *at, steps))
+        parts.append(frequency_rows(machine.robot, machine.terms, machine.cables, readings.frequencies, *at, steps))
     rows = FurtherRows(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
     deviation, given = reading_deviations(sensors, m, modes), np.broadcast_to(sensors.length_deviation, m)
     off = readings.lengths - lengths
@@ -264,6 +274,16 @@ def _with_further(
         back=np.concatenate((found.back, more[2]), axis=2),
         residual=np.concatenate((found.residual, rows.residual), axis=1),
     )
+
+
+def _turned_pulleys(machine: MachineTerms, poses: Array, lengths: Array) -> Array | None:
+    """Directions of the pulleys and derivatives of their swivel angles; None if all swivel axes are vertical."""
+    if machine.cables.shape[2] == tables.CABLE_COLUMNS:
+        return None
+    found = np.empty((*lengths.shape, SWIVEL_NUMBERS))
+    given = machine.robot.freedom, machine.body, machine.cables, _locked_view(lengths), _locked_view(poses), NO_LOAD
+    swivel_readings(machine.terms, given, memory_for(lengths.shape[1]), found)
+    return found
 
 
 def _steps(machine: MachineTerms) -> Array:

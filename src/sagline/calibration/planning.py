@@ -23,7 +23,6 @@ from sagline.core.memory import check_memory
 from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved
-from sagline.robot.batch import refuse_slanted
 from sagline.robot.checks import ROTATING
 from sagline.robot.drum import has_drum_data
 from sagline.robot.pose import Pose, PoseBox
@@ -219,7 +218,7 @@ def calibration_poses(
     Source:
         Fedorov 1972; Borm & Menq 1991 (choice of calibration poses); docs/model.md, section 14.
     """
-    refuse_slanted(instance(robot, Robot, "robot"))
+    instance(robot, Robot, "robot")
     size = whole_number(count, "count", 1, MOST)
     tried = whole_number(candidates, "candidates", size, MOST_CANDIDATES)
     drawn = whole_number(seed, "seed", 0)

@@ -20,6 +20,7 @@ from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.observe import starting_lengths
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward import centered_positions, search
+from sagline.robot.batch import has_slanted_axes
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
@@ -78,7 +79,7 @@ class FitProblem(NamedTuple):
     def from_level(self) -> bool:
         """True if the initial rotations are level, because reported lengths are too inaccurate for a search."""
         placed = not np.isnan(self.log.positions).any(axis=1).all()
-        return self.relative or (self.straight and placed)
+        return self.relative or (self.straight and (placed or has_slanted_axes(self.robot)))
 
     @property
     def straight(self) -> bool:
@@ -222,7 +223,7 @@ def held_lengths(
     starting_lengths(
         problem.model.terms(robot.gravity),
         robot.freedom,
-        cable_table(robot)[0],
+        cable_table(robot, slanted=True)[0],
         body_table(robot)[0],
         locked(poses.view()),
         locked(tension),

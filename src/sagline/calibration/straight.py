@@ -48,10 +48,14 @@ def lines_at(machine: MachineTerms, readings: Readings, poses: Array) -> _Lines:
     rows = np.empty((count, g.GEOMETRY_ROWS, m))
     with np.errstate(all="ignore"):
         g.cable_geometries(machine.cables, machine.body, np.ascontiguousarray(poses), np.empty((3, 3)), rows)
-    wrap = np.arctan2(rows[:, g.COSINE], cables[:, tables.ENTRY] * rows[:, g.SINE])
-    lengths = rows[:, g.CHORD] + cables[:, tables.PULLEY_RADIUS] * wrap + cables[:, tables.DEAD_CABLE]
     cosine = rows[:, g.COSINE]
     along = np.stack((rows[:, g.AZIMUTH_X] * cosine, rows[:, g.AZIMUTH_Y] * cosine, rows[:, g.SINE]), axis=-1)
+    sine, upward = cosine, cables[:, tables.ENTRY] * rows[:, g.SINE]  # of the wrap angle: sine, cosine
+    if cables.shape[1] > tables.CABLE_COLUMNS:
+        axes_of_pulleys = cables[:, tables.AXIS_X : tables.AXIS_Z + 1]
+        sine, upward = np.linalg.norm(np.cross(along, axes_of_pulleys), axis=2), np.sum(along * axes_of_pulleys, axis=2)
+    wrap = np.arctan2(sine, upward)
+    lengths = rows[:, g.CHORD] + cables[:, tables.PULLEY_RADIUS] * wrap + cables[:, tables.DEAD_CABLE]
     lever = np.moveaxis(rows[:, g.LEVER_X : g.LEVER_Z + 1], 1, 2)
     platform, axes = Rotation.from_quat(poses[:, 3:]), sensors.frame.matrix
     turned = platform.as_matrix()
@@ -73,7 +77,7 @@ def lines_at(machine: MachineTerms, readings: Readings, poses: Array) -> _Lines:
     motion[:, m : m + 3, :3] = axes.T
     motion[:, m + 3 :, 3:] = axes.T if measures_yaw(sensors) else np.eye(3)
     motion[:, m : m + 3, 3:] = np.cross(reach[:, None], axes.T)
-    return _Lines(lengths, residual, motion @ robot.freedom.T, along, turned, point, wrap - cosine)
+    return _Lines(lengths, residual, motion @ robot.freedom.T, along, turned, point, wrap - sine)
 
 
 def _deviations(machine: MachineTerms) -> Array:

@@ -17,7 +17,6 @@ from sagline.core.progress import blocks
 from sagline.kernels import codes
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.uncertainty import Uncertainty
-from sagline.robot.batch import refuse_slanted
 from sagline.robot.drum import has_drum_data
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot, standard_errors
@@ -67,7 +66,6 @@ def _check_model(robot: Robot, model: CableModel) -> None:
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Plan with Catenary(); the true cables are exact."
         raise InvalidValueError("model", type(model).__name__, "Catenary() or Elastic() for an uncertainty", step)
-    refuse_slanted(robot)
 
 
 def _known_errors(robot: Robot) -> Mapping[str, Array]:

@@ -20,6 +20,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import blocks
 from sagline.kernels import codes, forward_poses, inverse_poses, tables
+from sagline.kernels.cable import swivel
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.forward import distribution, sensitivity
 from sagline.kernels.memory import memory_for
@@ -201,7 +202,7 @@ class Kinematics:
     def states(self, count: int) -> tuple[ResultArray, ...]:
         """Outputs of `describe_states`."""
         m = self.cables
-        shapes = (6, 6), (m, 3, 3), (sensitivity.DATA, m, 3), (m, 3), (m, 3), (m, 7)
+        shapes = (6, 6), (m, 3, 3), (swivel.DATA, m, 3), (m, 3), (m, 3), (m, 7)
         return tuple(ResultArray((count, *shape)) for shape in shapes)
 
     def frame_end_tension(self, results: Value) -> Value:
@@ -260,7 +261,7 @@ class ForwardKinematics(Kinematics):
         """Derivative at the results of `solve`. The inner vector is the motion of the platform [m, rad]."""
         _, _, frame, platform, _ = inputs
         count, m, n, xp = len(first), self.cables, self.free, self.numpy
-        shapes = (6, 6), (sensitivity.DATA, 6, m), (6, 3 * m), (6, 3 * m), (m, m), (m, max(m - n, 0))
+        shapes = (6, 6), (swivel.DATA, 6, m), (6, 3 * m), (6, 3 * m), (m, m), (m, max(m - n, 0))
         found = self.call(
             *(sensitivity.sensitivities_of_states, self.terms, self.robots(frame, platform), first),
             *(results.swapaxes(0, 1), self.memory, self.states(count)),

@@ -233,7 +233,7 @@ class Plan(Result, Saved, Tabular):
 
         Raises:
             InvalidValueError: If the robot has no tolerances, an infinite tolerance, or a tolerance of a quantity that
-                it does not have. If the cable model is neither `Catenary` nor `Elastic`. If a swivel axis is slanted.
+                it does not have. If the cable model is neither `Catenary` nor `Elastic`.
 
         Examples:
             >>> import sagline as sl

@@ -10,6 +10,7 @@ import numpy as np
 from sagline.core.arrays import Array, Indices
 from sagline.core.progress import blocks, rows_of
 from sagline.kernels import tables
+from sagline.kernels.cable import swivel
 from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import has_routing, outward
@@ -66,7 +67,7 @@ class KernelStates(NamedTuple):
     ) -> KernelStates:
         """Arguments for N results of the kernels, and empty arrays."""
         count, m = results.shape[1:]
-        shapes = ((6, 6), (m, 3, 3), (sensitivity.DATA, m, 3), (m, 3), (m, 3), (m, 7))
+        shapes = ((6, 6), (m, 3, 3), (swivel.DATA, m, 3), (m, 3), (m, 3), (m, 7))
         arrays = tuple(np.empty((count, *shape)) for shape in shapes)
         return cls(terms, robots, poses, results, memory_for(m), arrays)
 

@@ -12,6 +12,7 @@ from sagline.core.arrays import Array, Flags, locked
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
+from sagline.kernels.cable import swivel
 from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import first_of, robot_fields
@@ -135,7 +136,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
         sensitivity.sensitivities_of_states(*arguments)
     shape = state.pose.shape
     compliance, by_data, by_frame, by_platform, tensions, null = arrays
-    data = [by_data[:, k].reshape(*shape, 6, m) for k in range(sensitivity.DATA)]
+    data = [by_data[:, k].reshape(*shape, 6, m) for k in range(swivel.DATA)]
     anchors = [array.reshape(*shape, 6, m, 3) for array in (by_frame, by_platform)]
     return Stiffness(
         state=state,
@@ -158,7 +159,7 @@ def sensitivity_arrays(state: Equilibrium) -> tuple[Array, ...]:
     """Empty arrays that `sensitivities_of_states` fills."""
     shape, n = state.cables.shape, first_of(state.robot).degrees_of_freedom
     count, m = math.prod(shape[:-1]), shape[-1]
-    shapes = ((6, 6), (sensitivity.DATA, 6, m), (6, 3 * m), (6, 3 * m), (m, m), (m, max(m - n, 0)))
+    shapes = ((6, 6), (swivel.DATA, 6, m), (6, 3 * m), (6, 3 * m), (m, m), (m, max(m - n, 0)))
     return tuple(np.empty((count, *one)) for one in shapes)
 
 

@@ -9,8 +9,9 @@ from scipy.optimize import fsolve
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.cable import forces, geometry, stiffness
+from sagline.kernels.cable import forces, geometry, stiffness, swivel
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.swivel import DATA, SLOPES
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from tests.kernels.compiled import compiled, from_python
@@ -18,6 +19,7 @@ from tests.kernels.compiled import compiled, from_python
 cable_geometry = from_python(geometry.cable_geometry)
 cable_forces = from_python(forces.forces_from_lengths)
 cable_stiffnesses = from_python(stiffness.stiffnesses_in_plane)
+slopes_of_swivel = from_python(swivel.slopes_of_swivel)
 energy_of_cables = stiffness.energy_of_cables
 
 MODEL = Model(CATENARY, 0.0, 0.0, 9.81, True)
@@ -191,3 +193,50 @@ def test_forces_are_those_of_a_cable_integrated_along_its_pulley() -> None:
     miss = np.linalg.norm(forces_of(rows) - force, axis=1) / np.linalg.norm(force, axis=1)
     assert (rows[g.STATUS] == CABLE_SOLVED).all()
     assert miss.max() < 1e-9  # 1.7e-10
+
+
+def total_slopes(cables: Array, rows: Array) -> Array:
+    """Derivatives of force, tension at the exit point and swivel angle at a fixed platform end, (DATA, count, 5)."""
+    each = np.zeros((len(cables), SLOPES, 5))
+    for i, slopes in enumerate(each):
+        slopes_of_swivel(MODEL, cables, rows, i, slopes)
+    each[:, :DATA, 3:] += each[:, :DATA, :3] @ each[:, DATA:, 3:]
+    return np.moveaxis(each[:, :DATA], 1, 0)
+
+
+def test_slopes_by_the_data_of_a_cable_are_those_of_differences() -> None:
+    count = 600
+    cables, ends, lengths = random_cables(count, seed=8)
+    rows = solved(cables, ends, lengths)
+    center = rows[[g.CENTER_X, g.CENTER_Y, g.CENTER_Z]].T
+    sideways, tension = np.cross(cables[:, tables.AXIS_X :], center), np.linalg.norm(forces_of(rows), axis=1)
+    weight = cables[:, tables.DENSITY] * MODEL.gravity
+    soft = 2e-3 * rows[g.LEAVING] * lengths / cables[:, tables.STIFFNESS]  # changes the tension by a small part [m]
+    steps = {
+        None: soft,
+        tables.DENSITY: 1e-3 * cables[:, tables.DENSITY] * np.minimum(1.0, 0.1 * tension / (weight * lengths)),
+        tables.STIFFNESS: 1e-3 * cables[:, tables.STIFFNESS],
+        tables.PULLEY_RADIUS: np.minimum(soft, 0.02 * cables[:, tables.PULLEY_RADIUS]),
+        tables.DEAD_CABLE: soft,
+    }
+    heavy = weight * cables[:, tables.PULLEY_RADIUS] / tension
+    for (column, step), found in zip(steps.items(), total_slopes(cables, rows), strict=True):
+        wanted = np.zeros((count, 5))
+        for times, share in {1: 45.0 / 60.0, 2: -9.0 / 60.0, 3: 1.0 / 60.0}.items():
+            for sign in (1.0, -1.0):
+                changed, longer = cables.copy(), lengths.copy()
+                by = sign * times * step
+                if column is None:
+                    longer += by
+                else:
+                    changed[:, column] += by
+                moved = solved(changed, ends, longer)
+                turned = moved[[g.CENTER_X, g.CENTER_Y, g.CENTER_Z]].T
+                angle = np.arctan2((sideways * turned).sum(axis=1), (center * turned).sum(axis=1))
+                now = np.column_stack((forces_of(moved), moved[g.LEAVING], angle))
+                wanted += (sign * share / step)[:, None] * now
+        for part, size in ((slice(0, 4), tension), (slice(4, 5), np.ones(count))):
+            off = np.linalg.norm(found[:, part] - wanted[:, part], axis=1)
+            whole, noise = np.linalg.norm(wanted[:, part], axis=1), 1e-12 * size / step
+            assert (off < noise + (1e-8 + 40.0 * heavy**2) * whole).all(), column  # neglected terms, as above
+            assert np.median(off / whole) < 2e-8, column

@@ -19,7 +19,7 @@ import numpy as np
 
 from sagline.kernels import codes
 from sagline.kernels.algebra import functions
-from sagline.kernels.cable.terms import Chord, Force, Material, Model
+from sagline.kernels.cable.terms import Chord, Force, Material, Model, PlaneVector
 from sagline.kernels.jit import formula, kernel
 
 RANGE = 500.0  # largest X = wD/(2 tau): sinh X overflows above it; practical cables are far below
@@ -64,6 +64,30 @@ def catenary_end(
     x = horizontal * length * (1.0 / stiffness + 2.0 / total * series) if horizontal != 0.0 else 0.0
     z = (vertical - 0.5 * weight * length) * length * (1.0 / stiffness + 2.0 / total)
     return x, z
+
+
+@formula
+def catenary_by_weight(
+    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
+) -> PlaneVector:
+    """Motion of the platform end per change of the weight per length, at fixed force [m^2/N]."""
+    vertical_a = vertical - weight * length
+    tension_a = math.hypot(horizontal, vertical_a)
+    total = tension_a + math.hypot(horizontal, vertical)
+    u = weight * length / total
+    if u <= 0.5:
+        excess = functions.atanhc_excess(u)
+    else:
+        excess = slack_series(horizontal, vertical_a, vertical, tension_a, total - tension_a) - 1.0
+    total_w = -length * vertical_a / tension_a
+    u_w = (length - u * total_w) / total
+    x_w = 0.0
+    if horizontal != 0.0:
+        bend = (u * u / (1.0 - u * u) - excess) / u if u > 1e-8 else 2.0 / 3.0 * u
+        x_w = 2.0 * horizontal * length * (bend * u_w - (1.0 + excess) * total_w / total) / total
+    middle = vertical - 0.5 * weight * length
+    z_w = -0.5 * length * length * (1.0 / stiffness + 2.0 / total) - 2.0 * middle * length * total_w / (total * total)
+    return PlaneVector(x_w, z_w)
 
 
 @formula

@@ -16,7 +16,13 @@ from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import across_pulley, energy_over, stiffness_in_series
-from sagline.kernels.cable.models import sag_of_shallow, shallow_sag_force, slack_series, stretching_tension
+from sagline.kernels.cable.models import (
+    catenary_by_weight,
+    sag_of_shallow,
+    shallow_sag_force,
+    slack_series,
+    stretching_tension,
+)
 from sagline.kernels.cable.pulley import end_by
 from sagline.kernels.cable.swivel import stiffness_of_swivel
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness, PlaneVector, Pulley, material_at
@@ -268,30 +274,6 @@ def _catenary_by_length(
 
 
 @formula
-def _catenary_by_weight(
-    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
-) -> PlaneVector:
-    """Motion of the platform end per change of the weight per length, at fixed force [m^2/N]."""
-    vertical_a = vertical - weight * length
-    tension_a = math.hypot(horizontal, vertical_a)
-    total = tension_a + math.hypot(horizontal, vertical)
-    u = weight * length / total
-    if u <= 0.5:
-        excess = atanhc_excess(u)
-    else:
-        excess = slack_series(horizontal, vertical_a, vertical, tension_a, total - tension_a) - 1.0
-    total_w = -length * vertical_a / tension_a
-    u_w = (length - u * total_w) / total
-    x_w = 0.0
-    if horizontal != 0.0:
-        bend = (u * u / (1.0 - u * u) - excess) / u if u > 1e-8 else 2.0 / 3.0 * u
-        x_w = 2.0 * horizontal * length * (bend * u_w - (1.0 + excess) * total_w / total) / total
-    middle = vertical - 0.5 * weight * length
-    z_w = -0.5 * length * length * (1.0 / stiffness + 2.0 / total) - 2.0 * middle * length * total_w / (total * total)
-    return PlaneVector(x_w, z_w)
-
-
-@formula
 def force_by_length(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
 ) -> PlaneVector:
@@ -337,7 +319,7 @@ def force_slopes(
         return _shallow_force_slopes(model, span, rise, material, length, tension)
     by_length = force_by_length(model, span, rise, material, length, force, plane)
     if model.code == codes.CATENARY and weight > 0.0:
-        by_weight = force_change(plane, _catenary_by_weight(horizontal, vertical, length, weight, stiffness))
+        by_weight = force_change(plane, catenary_by_weight(horizontal, vertical, length, weight, stiffness))
         by_density = PlaneVector(model.gravity * by_weight.x, model.gravity * by_weight.z)
         soft = -length / (stiffness * stiffness)
         stretched = PlaneVector(soft * horizontal, soft * (vertical - 0.5 * weight * length))
@@ -355,7 +337,7 @@ def slopes_over(
     weight = 0.0 if model.code == codes.ELASTIC else material.density * model.gravity
     by_weight = none = PlaneVector(0.0, 0.0)
     if weight > 0.0:
-        by_weight = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
+        by_weight = catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
     if force.horizontal == 0.0 and force.vertical == weight * free:  # the force at the exit point P is zero
         return _ForceSlopes(none, none, none, none, none)
     heavier = model.gravity if weight > 0.0 else 0.0

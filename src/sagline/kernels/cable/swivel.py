@@ -31,6 +31,7 @@ from sagline.kernels.cable.models import (
     CLOSE,
     ORDINARY,
     SMALL_HALLEY_STEP,
+    catenary_by_weight,
     catenary_end,
     catenary_from_length,
     from_length,
@@ -39,7 +40,7 @@ from sagline.kernels.cable.models import (
     slack_series,
 )
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.terms import Material, Model
+from sagline.kernels.cable.terms import Material, Model, PlaneVector
 from sagline.kernels.jit import entry, formula, glue, independent, kernel
 
 Vector = tuple[float, float, float]
@@ -54,6 +55,8 @@ STILL = 1e-10  # change of the free length, relative to the length, after which 
 LENGTHS = 12  # passes for the free length
 SHORTEST = 1e-3  # shortest free length, relative to the whole length
 TINY = 1e-300
+DATA = 5  # numbers of a cable by which the derivatives are computed
+SLOPES = DATA + 3  # rows of `slopes_of_swivel`
 
 
 class Swivel(NamedTuple):
@@ -211,67 +214,123 @@ def _inverse_of_symmetric(
     return inverse * i00, inverse * i01, inverse * i02, i11, i12, i22
 
 
-@kernel
-def _fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
-    """Fill stiffness K [N/m] and dT/dL = -K dB/dL [N/m] of cable `i`. `end`: force at the platform end [N]."""
-    # The compliance follows from three equations for psi, the swivel angle and the free length: F.e_rho = 0, v F.e_s -
-    # k e_s.z = 0, and the sum of all lengths. F is the force at the exit point.
-    x, y, z = end[0], end[1], end[2] - swivel.weight * free
+class _Equations(NamedTuple):
+    """Equations for psi, the swivel angle and the free length."""
+
+    # F.e_rho = 0, (v F.e_s - k e_s.z)/R = 0, and the sum of all lengths. F is the force at the exit point, v = R (1 -
+    # cos psi), and k e_s.z the moment of the weight on the pulley. The matrix `i` times `inverse` is the inverse of the
+    # derivatives of the equations by these unknowns.
+    i00: float
+    i01: float
+    i02: float
+    i10: float
+    i11: float
+    i12: float
+    i20: float
+    i21: float
+    i22: float
+    inverse: float
+    ux: float  # F/T
+    uy: float
+    uz: float
+    by_tension: float  # derivative of the unstrained length between exit point and drum by T [m/N]
+    moment: float  # derivative of k e_s.z/R by T, with the opposite sign
+    bends: float  # derivative of the dead length by the square of the stretch [m]
+    strained: float
+    entering: float
+    drawn: float
+    zeta: float
+    integral: float
+
+
+@formula
+def _equations(swivel: Swivel, at: Exit, x: float, y: float, z: float) -> _Equations:
+    """Equations of an exit point with the force (`x`, `y`, `z`) [N]."""
     w, radius, rz, sz, nz = swivel.weight, swivel.radius, at.rz, at.sz, swivel.z
     sine, cosine, wrap = at.sine, at.cosine, at.wrap
     tension = math.sqrt(x * x + y * y + z * z)
     zeta, integral = _height(swivel, rz, sine, cosine, wrap)
     e, entering, drawn = _strains(swivel, tension, zeta)
     soft, inverse = 1.0 / swivel.stiffness, 1.0 / e
-    beta, v = w * radius * soft, radius * (1.0 - cosine)
-    # lambda: the dead length's derivative is 2 lambda E per change of the stretch E at the exit point [m]
+    beta, v = w * radius * soft, 1.0 - cosine
     total = 1.0 / (entering + drawn)
     bends = -swivel.dead * total * total * (entering + drawn) / (entering * drawn)
     square, cube = inverse * inverse, inverse * inverse * inverse
     by_tension = (2.0 * bends * e - radius * wrap * square - 3.0 * radius * beta * integral * cube * inverse) * soft
     up = sine * rz + cosine * nz  # t.z
     slip = wrap - sine
-    k = w * radius * radius * slip * inverse
+    k = w * radius * slip * inverse
     moment = k * inverse * soft * sz
     unit = 1.0 / tension
-    ux, uy, uz = x * unit, y * unit, z * unit  # F/T
+    ux, uy, uz = x * unit, y * unit, z * unit
     along = x * swivel.x + y * swivel.y + z * nz
     outward = x * at.rx + y * at.ry + z * rz
     sideways = x * at.sx + y * at.sy + z * at.sz
-    # derivatives of the equations by the unknowns, row by row
     turning = -v * outward + k * rz
+    # derivatives of the equations by the unknowns, row by row
     a0, a1, a2 = outward * sine + along * cosine, -cosine * sideways, -w * (sine * nz - cosine * rz)
-    b0 = radius * sine * sideways - w * radius * v * inverse * sz
-    b1 = turning if abs(turning) > TINY else -1.0  # an eyelet, or a cable along its axis: any swivel angle
+    b0 = sine * sideways - w * radius * v * inverse * sz
+    b1 = turning if abs(turning) > TINY else -1.0  # a cable along its axis: any swivel angle
     b2 = -w * (sz * v + moment * uz)
     c0 = radius * inverse + radius * beta * wrap * up * cube - 2.0 * beta * bends * up
-    c1 = sz * beta * (radius * (wrap * (1.0 - cosine) - slip) * cube - 2.0 * bends * (1.0 - cosine))
+    c1 = sz * beta * (radius * (wrap * v - slip) * cube - 2.0 * bends * v)
     c2 = 1.0 - w * by_tension * uz
-    # inverse of this matrix, with the motion of the end by each unknown: motions of the end by each equation
     i00, i01, i02 = b1 * c2 - b2 * c1, a2 * c1 - a1 * c2, a1 * b2 - a2 * b1
     i10, i11, i12 = b2 * c0 - b0 * c2, a0 * c2 - a2 * c0, a2 * b0 - a0 * b2
     i20, i21, i22 = b0 * c1 - b1 * c0, a1 * c0 - a0 * c1, a0 * b1 - a1 * b0
     inverse = 1.0 / (a0 * i00 + a1 * i10 + a2 * i20)
-    turn, swing, grow = radius * inverse, v * inverse, e * inverse
-    tx, ty, tz = sine * at.rx + cosine * swivel.x, sine * at.ry + cosine * swivel.y, up
-    tangent, sideway, forward = (tx, ty, tz), (at.sx, at.sy, sz), (ux, uy, uz)
-    ax, ay, az = _combined(turn * i00, tangent, swing * i10, sideway, grow * i20, forward)
-    bx, by, bz = _combined(turn * i01, tangent, swing * i11, sideway, grow * i21, forward)
-    cx, cy, cz = _combined(turn * i02, tangent, swing * i12, sideway, grow * i22, forward)
-    # derivatives of the equations by F, with the opposite sign
-    px, py, pz = cosine * at.rx - sine * swivel.x, cosine * at.ry - sine * swivel.y, cosine * rz - sine * nz
-    qx, qy, qz = -v * at.sx - moment * ux, -v * at.sy - moment * uy, -v * sz - moment * uz
-    sx, sy, sz = -by_tension * ux, -by_tension * uy, -by_tension * uz
+    return _Equations(
+        i00, i01, i02, i10, i11, i12, i20, i21, i22, inverse, ux, uy, uz, by_tension, moment, bends, e, entering, drawn,
+        zeta, integral,
+    )  # fmt: skip
+
+
+@formula
+def _motion_by(swivel: Swivel, at: Exit, q: _Equations, right: Vector) -> tuple[Vector, Vector]:
+    """Motion of the platform end [m] by a change of the right sides of the equations, at a fixed force on the end."""
+    # The second result contains the changes of psi [rad], of the swivel angle [rad] and of the free length [m].
+    one, two, three = right
+    psi = q.inverse * (q.i00 * one + q.i01 * two + q.i02 * three)
+    sigma = q.inverse * (q.i10 * one + q.i11 * two + q.i12 * three)
+    free = q.inverse * (q.i20 * one + q.i21 * two + q.i22 * three)
+    turn, swing, grow = swivel.radius * psi, swivel.radius * (1.0 - at.cosine) * sigma, q.strained * free
+    tx, ty = at.sine * at.rx + at.cosine * swivel.x, at.sine * at.ry + at.cosine * swivel.y
+    tangent = tx, ty, at.sine * at.rz + at.cosine * swivel.z
+    end = _combined(turn, tangent, swing, (at.sx, at.sy, at.sz), grow, (q.ux, q.uy, q.uz))
+    return end, (psi, sigma, free)
+
+
+@formula
+def _forces_on(swivel: Swivel, at: Exit, q: _Equations) -> tuple[Vector, Vector, Vector]:
+    """Derivatives of the right sides of the equations by the force at the exit point, world axes."""
+    v, m, s = 1.0 - at.cosine, q.moment, q.by_tension
+    return (
+        (at.cosine * at.rx - at.sine * swivel.x, -v * at.sx - m * q.ux, -s * q.ux),
+        (at.cosine * at.ry - at.sine * swivel.y, -v * at.sy - m * q.uy, -s * q.uy),
+        (at.cosine * at.rz - at.sine * swivel.z, -v * at.sz - m * q.uz, -s * q.uz),
+    )
+
+
+@kernel
+def _fill_stiffness(swivel: Swivel, at: Exit, end: Vector, free: float, rows: Array, i: int) -> None:
+    """Fill stiffness K [N/m] and dT/dL = -K dB/dL [N/m] of cable `i`. `end`: force at the platform end [N]."""
+    x, y, z = end[0], end[1], end[2] - swivel.weight * free
+    q = _equations(swivel, at, x, y, z)
+    by_x, by_y, by_z = _forces_on(swivel, at, q)
+    (mxx, mxy, mxz), _ = _motion_by(swivel, at, q, by_x)
+    (myx, myy, myz), _ = _motion_by(swivel, at, q, by_y)
+    (mzx, mzy, mzz), _ = _motion_by(swivel, at, q, by_z)
+    (cx, cy, cz), _ = _motion_by(swivel, at, q, (0.0, 0.0, 1.0))
     # the compliance, with the free span
     horizontal = math.sqrt(x * x + y * y)
     c, s = (x / horizontal, y / horizontal) if horizontal > 0.0 else (1.0, 0.0)
-    free_xx, free_xz, free_zz, across = _free_compliance(horizontal, end[2], free, w, swivel.stiffness)
-    xx = ax * px + bx * qx + cx * sx + (free_xx * c * c + across * s * s)
-    yy = ay * py + by * qy + cy * sy + (free_xx * s * s + across * c * c)
-    zz = az * pz + bz * qz + cz * sz + free_zz
-    xy = 0.5 * (ax * py + bx * qy + cx * sy + ay * px + by * qx + cy * sx) + (free_xx - across) * c * s
-    xz = 0.5 * (ax * pz + bx * qz + cx * sz + az * px + bz * qx + cz * sx) + free_xz * c
-    yz = 0.5 * (ay * pz + by * qz + cy * sz + az * py + bz * qy + cz * sy) + free_xz * s
+    free_xx, free_xz, free_zz, across = _free_compliance(horizontal, end[2], free, swivel.weight, swivel.stiffness)
+    xx = mxx + (free_xx * c * c + across * s * s)
+    yy = myy + (free_xx * s * s + across * c * c)
+    zz = mzz + free_zz
+    xy = 0.5 * (mxy + myx) + (free_xx - across) * c * s
+    xz = 0.5 * (mxz + mzx) + free_xz * c
+    yz = 0.5 * (myz + mzy) + free_xz * s
     i00, i01, i02, i11, i12, i22 = _inverse_of_symmetric(xx, xy, xz, yy, yz, zz)
     rows[g.W_XX, i], rows[g.W_XY, i], rows[g.W_XZ, i] = i00, i01, i02
     rows[g.W_YY, i], rows[g.W_YZ, i], rows[g.W_ZZ, i] = i11, i12, i22
@@ -614,55 +673,68 @@ def stiffness_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> Non
         rows[g.LONGER_X, i] = rows[g.LONGER_Y, i] = rows[g.LONGER_Z, i] = 0.0
 
 
-@formula
-def rise_of_exit(swivel: Swivel, x: float, y: float, z: float) -> Vector:
-    """Derivative of the height of the exit point by the force (`x`, `y`, `z`) at the exit point [m/N]."""
-    nx, ny, nz = swivel.x, swivel.y, swivel.z
-    along = x * nx + y * ny + z * nz
-    rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
-    across = math.sqrt(rx * rx + ry * ry + rz * rz)
-    inverse, share = 1.0 / max(across, TINY), 1.0 / max(math.sqrt(across * across + along * along), TINY)
-    rx, ry, rz = rx * inverse, ry * inverse, rz * inverse
-    sine, cosine = across * share, along * share
-    sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
-    turn = -swivel.radius * share * (sine * rz + cosine * nz)
-    # v/|F_p| = R tan(psi/2)/T is regular for a cable along its axis
-    swing = swivel.radius * share * math.tan(0.5 * math.atan2(across, along)) * sz
-    return (
-        turn * (sine * nx - cosine * rx) + swing * sx,
-        turn * (sine * ny - cosine * ry) + swing * sy,
-        turn * (sine * nz - cosine * rz) + swing * sz,
-    )
-
-
-DATA_STEP = 1e-4  # relative step of the differences by cable data
-
-
 @kernel
-def force_slopes_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: Array) -> None:
-    """Fill dT/dL and the derivatives of the force of cable `i` by density, EA, R and dead length, (DATA, m, 3)."""
-    # The motion of the platform end at a fixed force is a central difference; its relative error is about 1e-8.
+def slopes_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: Array) -> None:
+    """Fill `slopes` (SLOPES, 5) of cable `i`, after `stiffness_of_swivel`; zero for a cable without force."""
+    # The first rows are derivatives by length, density, EA, pulley radius and dead length: of the force on the platform
+    # end, which is at rest, and of the tension at the exit point [N] and the swivel angle [rad], at a fixed force on
+    # the platform end. The last three rows are derivatives of the tension and the angle by this force, world axes.
+    slopes[:] = 0.0
+    if not rows[g.LEAVING, i] > 0.0:
+        return
     s = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
-    gravity = s.weight / cables[i, tables.DENSITY] if s.weight > 0.0 else 0.0
-    length, free = rows[g.LENGTH, i], rows[g.FREE_LENGTH, i]
-    force = (rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
-    slopes[0, i, 0], slopes[0, i, 1], slopes[0, i, 2] = rows[g.LONGER_X, i], rows[g.LONGER_Y, i], rows[g.LONGER_Z, i]
-    for k in range(1, 5):
-        slopes[k, i] = 0.0
-        step = DATA_STEP * (s.weight if k == 1 else s.stiffness if k == 2 else s.radius if k == 3 else length)
-        if step == 0.0 or rows[g.LEAVING, i] == 0.0:
-            continue
-        w, ea = step if k == 1 else 0.0, step if k == 2 else 0.0
-        r, d = step if k == 3 else 0.0, step if k == 4 else 0.0
-        more = Swivel(s.x, s.y, s.z, s.radius + r, s.dead + d, s.rise, s.weight + w, s.stiffness + ea)
-        less = Swivel(s.x, s.y, s.z, s.radius - r, s.dead - d, s.rise, s.weight - w, s.stiffness - ea)
-        ax, ay, az, _free = _end_of(more, length, free, force)
-        bx, by, bz, _free = _end_of(less, length, free, force)
-        per = -0.5 / step * (gravity if k == 1 else 1.0)
-        x, y, z = per * (ax - bx), per * (ay - by), per * (az - bz)
-        slopes[k, i, 0] = _product(rows, i, g.W_XX, g.W_XY, g.W_XZ, (x, y, z))
-        slopes[k, i, 1] = _product(rows, i, g.W_XY, g.W_YY, g.W_YZ, (x, y, z))
-        slopes[k, i, 2] = _product(rows, i, g.W_XZ, g.W_YZ, g.W_ZZ, (x, y, z))
+    at, free, w, soft = _stored(s, rows, i), rows[g.FREE_LENGTH, i], s.weight, 1.0 / s.stiffness
+    x, y, end = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
+    q = _equations(s, at, x, y, end - w * free)
+    e, v, sz, total = q.strained, 1.0 - at.cosine, at.sz, 1.0 / (q.entering + q.drawn)
+    beta, slip, late = w * s.radius * soft, (at.wrap - at.sine) / e, s.dead * total * total / q.drawn
+    by_x, by_y, by_z = _forces_on(s, at, q)
+    one, two, three = by_z
+    gravity = w / cables[i, tables.DENSITY] if w > 0.0 else 0.0
+    for k in range(SLOPES):
+        # right sides of the equations, and the motion of the end at a fixed exit point and free length
+        a, b, c, heavier, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        if k == 0:
+            c = 1.0
+        elif k == 1:  # a heavier cable also decreases the force at the exit point
+            heavier = gravity
+            part = q.integral * s.radius * soft / (e * e * e) - 2.0 * q.bends * soft * q.zeta
+            part = s.radius * part + 2.0 * late * soft * s.rise
+            a, b, c = -free * one, s.radius * slip * sz - free * two, -part - free * three
+            a, b, c = gravity * a, gravity * b, gravity * c
+            level = math.sqrt(x * x + y * y)
+            by_weight = catenary_by_weight(level, end, free, w, s.stiffness) if w > 0.0 else PlaneVector(0.0, 0.0)
+            share = gravity * by_weight.x / level if level > 0.0 else 0.0
+            dx, dy, dz = share * x, share * y, gravity * by_weight.z
+        elif k == 2:
+            less = (e - 1.0) * soft  # minus the derivative of the stretch at the exit point
+            part = less * (at.wrap / (e * e) + 3.0 * beta * q.integral / (e * e * e * e))
+            part = s.radius * (part - beta * soft * q.integral / (e * e * e))
+            part += 2.0 * q.bends * (beta * soft * q.zeta - e * less) - 2.0 * late * w * s.rise * soft * soft
+            b, c = w * s.radius * slip * sz * less / e, -part
+            dx, dy, dz = -free * soft * soft * x, -free * soft * soft * y, -free * soft * soft * (end - 0.5 * w * free)
+        elif k == 3:
+            b = w * slip * sz
+            c = -(at.wrap + 2.0 * beta * q.integral / (e * e)) / e + 2.0 * q.bends * w * soft * q.zeta
+            dx, dy, dz = v * at.rx + at.sine * s.x, v * at.ry + at.sine * s.y, v * at.rz + at.sine * s.z
+        elif k == 4:
+            c = -2.0 * total
+        elif k == 5:
+            a, b, c = by_x
+        elif k == 6:
+            a, b, c = by_y
+        else:
+            a, b, c = by_z
+        (ex, ey, ez), (_psi, sigma, grown) = _motion_by(s, at, q, (a, b, c))
+        slopes[k, 3], slopes[k, 4] = -q.uz * (w * grown + free * heavier), sigma
+        if k < DATA:
+            away = (-ex - dx, -ey - dy, -ez - dz)
+            slopes[k, 0] = _product(rows, i, g.W_XX, g.W_XY, g.W_XZ, away)
+            slopes[k, 1] = _product(rows, i, g.W_XY, g.W_YY, g.W_YZ, away)
+            slopes[k, 2] = _product(rows, i, g.W_XZ, g.W_YZ, g.W_ZZ, away)
+    slopes[5, 3] += q.ux
+    slopes[6, 3] += q.uy
+    slopes[7, 3] += q.uz
 
 
 @kernel

@@ -6,11 +6,12 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels import codes
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
+from sagline.kernels.cable.swivel import DATA, SLOPES, slopes_of_swivel
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Unknowns, is_level
@@ -236,14 +237,13 @@ def _add_parameter_change(
     row: int,
     i: int,
     gain: float,
-    pair: PlaneVector,
+    change: Triple,
     alone: float,
     space: CalibrationArrays,
 ) -> None:
     """Add the effects of a parameter of cable `i` to a column: on its platform-end force and its frame-end tension."""
     at = sought.where[row, i]
     if at >= 0:
-        change = _in_world_axes(space.rows, i, pair)
         direct = gain * (_tension_by_force(space.shares, i, change) + alone)
         _add_force_change(space, i, at, sought.scale[row, i], change, direct)
 
@@ -255,10 +255,17 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
         across = end_stiffness(cables, space.rows, i)
         for k in range(3):
             space.ends[i, k], space.ends[i, 3 + k], space.ends[i, 6 + k] = across[0][k], across[1][k], across[2][k]
-        slopes = _frame_end_slopes(model, cables, space.rows, i)
-        x, y, z = in_world_axes(space.rows, i, slopes.along, slopes.up)
+        if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+            slopes = space.slopes[SLOPES * i : SLOPES * i + SLOPES]
+            slopes_of_swivel(model, cables, space.rows, i, slopes)
+            for k in range(3):
+                space.shares[i, k] = slopes[DATA + k, 3]
+            space.shares[i, 3], space.shares[i, 4] = 0.0, space.rows[g.LEAVING, i]
+            continue
+        by = _frame_end_slopes(model, cables, space.rows, i)
+        x, y, z = in_world_axes(space.rows, i, by.along, by.up)
         space.shares[i, 0], space.shares[i, 1], space.shares[i, 2] = x, y, z
-        space.shares[i, 3], space.shares[i, 4] = slopes.by_height, slopes.tension
+        space.shares[i, 3], space.shares[i, 4] = by.by_height, by.tension
 
 
 @glue
@@ -284,6 +291,30 @@ def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple
 
 
 @glue
+def _fill_material(
+    model: Model, cables: Array, gain: float, sought: Unknowns, i: int, space: CalibrationArrays
+) -> tuple[Triple, float]:
+    """Add material and pulley of cable `i` to the columns. Changes of force and tension per length are returned."""
+    rows, by = space.rows, _frame_end_slopes(model, cables, space.rows, i)
+    span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
+    material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
+    if model.behind is None:
+        own = force_slopes(model, span, rise, material, length, pulled, plane)
+    else:
+        free = rows[g.FREE_LENGTH, i]
+        own = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
+        change = _in_world_axes(rows, i, own.by_radius)
+        _add_parameter_change(sought, kinds.RADIUS, i, gain, change, by.by_radius, space)
+        change = _in_world_axes(rows, i, own.by_dead)
+        _add_parameter_change(sought, kinds.DEAD, i, gain, change, by.by_dead, space)
+    change = _in_world_axes(rows, i, own.by_density)
+    _add_parameter_change(sought, kinds.DENSITY, i, gain, change, by.by_density, space)
+    change = _in_world_axes(rows, i, own.by_stiffness)
+    _add_parameter_change(sought, kinds.STIFFNESS, i, gain, change, by.by_stiffness, space)
+    return _in_world_axes(rows, i, own.by_length), by.by_length
+
+
+@glue
 def fill_cable(
     model: Model, cables: Array, gain: float, sought: Unknowns, p: int, i: int, space: CalibrationArrays
 ) -> None:
@@ -305,20 +336,15 @@ def fill_cable(
             _add_wrench_change(space, at, scale[kinds.PLATFORM + axis, i], change, moment)
             direct = gain * (_tension_by_force(shares, i, change) + shares[i, 3] * moved[2])
             space.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
-    by = _frame_end_slopes(model, cables, rows, i)
-    span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
-    material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
-    if model.behind is None:
-        own = force_slopes(model, span, rise, material, length, pulled, plane)
+    if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        slopes = space.slopes[SLOPES * i : SLOPES * i + SLOPES]
+        for k in range(1, DATA):  # the rows of `kinds` have the same order
+            pulled = (slopes[k, 0], slopes[k, 1], slopes[k, 2])
+            _add_parameter_change(sought, kinds.DENSITY + k - 1, i, gain, pulled, slopes[k, 3], space)
+        change, alone = (slopes[0, 0], slopes[0, 1], slopes[0, 2]), slopes[0, 3]
     else:
-        free = rows[g.FREE_LENGTH, i]
-        own = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
-        _add_parameter_change(sought, kinds.RADIUS, i, gain, own.by_radius, by.by_radius, space)
-        _add_parameter_change(sought, kinds.DEAD, i, gain, own.by_dead, by.by_dead, space)
-    _add_parameter_change(sought, kinds.DENSITY, i, gain, own.by_density, by.by_density, space)
-    _add_parameter_change(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space)
-    change = _in_world_axes(rows, i, own.by_length)
-    direct = gain * (_tension_by_force(shares, i, change) + by.by_length)
+        change, alone = _fill_material(model, cables, gain, sought, i, space)
+    direct = gain * (_tension_by_force(shares, i, change) + alone)
     _fill_length(space, i, change, cross(lever, change), direct)
     for k in range(5):
         row = kinds.ZERO + k if k < 2 else (kinds.STIFFNESS if k == 2 else kinds.SCALE + k - 3)
@@ -326,7 +352,7 @@ def fill_cable(
         if at >= 0:
             _add_force_change(space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
     if where[kinds.GAIN, i] >= 0:
-        space.work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * by.tension
+        space.work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * shares[i, 4]
     if where[kinds.BIAS, i] >= 0:
         space.work[i, where[kinds.BIAS, i]] += scale[kinds.BIAS, i]
 

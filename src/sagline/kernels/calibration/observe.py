@@ -11,11 +11,13 @@ import math
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import chord_tension_at_frame_end, hold_cable
-from sagline.kernels.cable.terms import Model, Terms, chord_at, material_at, model_of
+from sagline.kernels.cable.swivel import DATA, SLOPES, slopes_of_swivel, stiffness_of_swivel, swivel_at
+from sagline.kernels.cable.terms import Model, Pulley, Terms, chord_at, material_at, model_of
 from sagline.kernels.calibration import columns
 from sagline.kernels.calibration import terms as t
 from sagline.kernels.forward import platform
@@ -208,6 +210,46 @@ def observe(
         _store_linearization(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)
 
 
+@entry
+def swivel_readings(
+    model: platform.ForwardTerms,
+    given: platform.SampleArrays,
+    memory: tuple[Array, Indices],
+    found: Array,
+) -> None:
+    """Directions of pulleys with swivel axes of any direction at N equilibria, and derivatives of the swivel angles.
+
+    The arguments are the same as in `observe`. `found` (N, m, SWIVEL_NUMBERS), to be filled: unit vector from the
+    axis to the center of the pulley; derivatives of the angle about the axis by the platform end [rad/m], and by the
+    cable's length, density, EA, pulley radius and dead length.
+    """
+    batch = platform.ForwardSamples(*given)
+    code, k_h, k_p, behind = model
+    count, m = batch.lengths.shape
+    rotation, rest = block(Memory(*memory), 3, 3)
+    rows, rest = block(rest, g.CABLE_ROWS, m)
+    slopes, rest = block(rest, SLOPES, 5)
+    six, rest = vector(rest, 6)
+    for p in range(count):
+        body, cables, pose = platform.row_of(batch.bodies, p), platform.row_of(batch.robots, p), batch.starts[p]
+        placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
+        for i in range(m):
+            rows[g.LENGTH, i] = batch.lengths[p, i]
+            rows[g.PARAMETER, i] = math.nan  # a result must not depend on the previous sample
+        platform.unbalance(placed, cables, body, platform.row_of(batch.wrenches, p), pose, rotation, rows, six)
+        for i in range(m):
+            stiffness_of_swivel(placed, cables, rows, i)
+            slopes_of_swivel(placed, cables, rows, i, slopes)
+            own, turn = found[p, i], (slopes[DATA, 4], slopes[DATA + 1, 4], slopes[DATA + 2, 4])
+            own[0], own[1], own[2] = rows[g.CENTER_X, i], rows[g.CENTER_Y, i], rows[g.CENTER_Z, i]
+            own[3] = rows[g.W_XX, i] * turn[0] + rows[g.W_XY, i] * turn[1] + rows[g.W_XZ, i] * turn[2]
+            own[4] = rows[g.W_XY, i] * turn[0] + rows[g.W_YY, i] * turn[1] + rows[g.W_YZ, i] * turn[2]
+            own[5] = rows[g.W_XZ, i] * turn[0] + rows[g.W_YZ, i] * turn[1] + rows[g.W_ZZ, i] * turn[2]
+            for k in range(DATA):
+                own[6 + k] = slopes[k, 4] + slopes[k, 0] * turn[0] + slopes[k, 1] * turn[1] + slopes[k, 2] * turn[2]
+
+
+SWIVEL_NUMBERS = 6 + DATA  # per cable in the result of `swivel_readings`
 ITERATIONS = 3  # iterations of the force balance; few suffice, because the sag forces depend weakly on the tensions
 LEAST = 0.2  # smallest ratio of a corrected tension to the measured tension
 
@@ -227,6 +269,24 @@ def _move_into_balance(along: Array, factor: Array, load: Array, tau: Array, lea
         for j in range(n):
             change += along[i, j] * load[j]
         tau[i] = max(tau[i] - change, least[i])
+
+
+@formula
+def _pulley_without_axis(cables: Array, i: int) -> Pulley:
+    """Pulley of cable `i`; none with swivel axes of any direction."""
+    if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        return Pulley(0.0, 1.0, 0.0, 0.0)
+    return pulley_at(cables, i)
+
+
+@formula
+def _length_to_drum(cables: Array, geometry: Array, i: int, tension: float) -> float:
+    """Unstrained length [m] of a weightless cable between the tangent and the drum, with a swivel axis."""
+    swivel, chord = swivel_at(cables, i, 0.0), chord_at(geometry, i)
+    across = geometry[g.AZIMUTH_X, i] * swivel.x + geometry[g.AZIMUTH_Y, i] * swivel.y
+    along = chord.cosine * across + chord.sine * swivel.z
+    wrap = angle(math.sqrt(max(1.0 - along * along, 0.0)), along)
+    return (swivel.radius * wrap + swivel.dead) / (1.0 + tension / swivel.stiffness)
 
 
 @entry
@@ -271,7 +331,7 @@ def starting_lengths(
         cable_geometry(cables, body, poses[p], rotation, geometry)
         for i in range(m):
             chord, material = chord_at(geometry, i), material_at(cables, i)
-            tau[i] = chord_tension_at_frame_end(model, chord, material, pulley_at(cables, i), tension[p, i])
+            tau[i] = chord_tension_at_frame_end(model, chord, material, _pulley_without_axis(cables, i), tension[p, i])
             least[i] = LEAST * max(tau[i], 0.5 * material.density * model.gravity * chord.length)
             tau[i] = max(tau[i], least[i])
             six[:] = 0.0
@@ -287,7 +347,8 @@ def starting_lengths(
             six[:] = 0.0
             six[2] = body[tables.MASS] * model.gravity
             for i in range(m):
-                chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)
+                chord, material = chord_at(geometry, i), material_at(cables, i)
+                pulley = _pulley_without_axis(cables, i)
                 length_out[p, i], sag_force[i], _tension = hold_cable(model, chord, material, pulley, tau[i])
                 platform.add_force(geometry, i, 0.0, sag_force[i], six)
             components_along(freedom, six, part)
@@ -295,7 +356,9 @@ def starting_lengths(
                 break
             _move_into_balance(along, factor, part, tau, least)
         for i in range(m):
-            chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)
-            length_out[p, i] = hold_cable(model, chord, material, pulley, tau[i])[0]
+            chord, material = chord_at(geometry, i), material_at(cables, i)
+            length_out[p, i] = hold_cable(model, chord, material, _pulley_without_axis(cables, i), tau[i])[0]
+            if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+                length_out[p, i] += _length_to_drum(cables, geometry, i, tau[i])
             if not length_out[p, i] > 0.0:
                 length_out[p, i] = math.nan

@@ -17,6 +17,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.cable.pulley import from_axis, pulley_at
 from sagline.kernels.cable.states import TensionLimits
+from sagline.kernels.cable.swivel import SLOPES
 from sagline.kernels.cable.terms import Cables, Model, chord_at, new_cables
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.sensitivity import BY_LENGTH, States, describe_pose, invert_scaled
@@ -249,11 +250,12 @@ def sensitivities_of_lengths(
     state, limited = States(*states), TensionLimits(*limits)
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, m)
+    more, rest = block(rest, SLOPES, 5)
     cables, rest = new_cables(rest, m, True)
     work, rest = _new_distribution(rest, n, m)
     active, rest = counters(rest, m)
     for p in range(poses.shape[0]):
-        known = describe_pose(model, robots, poses, results, p, (rotation, rows), state)
+        known = describe_pose(model, robots, poses, results, p, (rotation, rows, more), state)
         body, robot, goal = f.row_of(robots[1], p), f.row_of(robots[2], p), f.row_of(goals, p)
         placed = Model(model[0], model[1], model[2], body[tables.GRAVITY], None)
         known = known and place_cables(placed, limited, robot, rows, cables)

@@ -13,7 +13,7 @@ from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
-from sagline.kernels.cable.swivel import TINY, fill_from_results, force_slopes_of_swivel, rise_of_exit, swivel_at
+from sagline.kernels.cable.swivel import DATA, SLOPES, TINY, fill_from_results, slopes_of_swivel
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.forward import FLAT
@@ -23,7 +23,6 @@ from sagline.kernels.statics import matrix_along, symmetric_part
 
 # index of the quantity with respect to which the force is differentiated
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
-DATA = 5
 
 
 @formula
@@ -36,9 +35,10 @@ def _fill_in_world_axes(pair: PlaneVector, rows: Array, i: int, vector: Array) -
 
 @glue
 def _describe_cable(
-    model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array
+    model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array, more: Array
 ) -> None:
     """Fill `block` (3, 3), `slopes` (DATA, m, 3) and `lever` (3,) of cable `i`, after `platform_stiffness`."""
+    # With swivel axes of any direction, `more` (SLOPES, 5) is filled as well; see `slopes_of_swivel`.
     across = f.end_stiffness(cables, rows, i)
     for j in range(3):
         block[0, j] = across[0][j]
@@ -46,7 +46,10 @@ def _describe_cable(
         block[2, j] = across[2][j]
         lever[j] = rows[g.LEVER_X + j, i]
     if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-        force_slopes_of_swivel(model, cables, rows, i, slopes)
+        slopes_of_swivel(model, cables, rows, i, more)
+        for k in range(DATA):
+            for j in range(3):
+                slopes[k, i, j] = more[k, j]
         return
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, force, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
@@ -61,10 +64,14 @@ def _describe_cable(
 
 
 @formula
-def _at_frame_end(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float, float, float]:
-    """Coefficients of the change of the frame-end tension of cable `i`."""
+def _at_frame_end(
+    model: Model, cables: Array, rows: Array, i: int, more: Array
+) -> tuple[float, float, float, float, float]:
+    """Coefficients of the change of the frame-end tension of cable `i`, after `_describe_cable`."""
     # Three for the change of the force on the platform end, world axes; one for the rise of the platform end [N/m]; one
     # for the change of the length [N/m]. H = T + T^2/(2 EA) - w z is constant along a cable.
+    if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+        return more[DATA, 3], more[DATA + 1, 3], more[DATA + 2, 3], 0.0, more[BY_LENGTH, 3]
     horizontal, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
     cx, cy = (rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]) if horizontal > 0.0 else (0.0, 0.0)
     x, y = horizontal * cx, horizontal * cy
@@ -79,13 +86,11 @@ def _at_frame_end(model: Model, cables: Array, rows: Array, i: int) -> tuple[flo
     at_end = math.sqrt(horizontal * horizontal + z * z)
     share = 1.0 / (1.0 + leaving / stiffness)
     along = share * (1.0 + at_end / stiffness) / max(at_end, TINY)
-    if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-        rx, ry, rz = rise_of_exit(swivel_at(cables, i, model.gravity), x, y, down)
-    else:  # derivative of the height of the exit point, R cos psi d(psi)
-        radius, entering = pulley_at(cables, i).radius, pulley_at(cables, i).entry
-        cosine = rows[g.WRAP_COSINE, i]
-        raised = radius * entering * cosine * inverse
-        rx, ry, rz = raised * cosine * cx, raised * cosine * cy, -raised * entering * rows[g.WRAP_SINE, i]
+    # derivative of the height of the exit point, R cos psi d(psi)
+    radius, entering = pulley_at(cables, i).radius, pulley_at(cables, i).entry
+    cosine = rows[g.WRAP_COSINE, i]
+    raised = radius * entering * cosine * inverse
+    rx, ry, rz = raised * cosine * cx, raised * cosine * cy, -raised * entering * rows[g.WRAP_SINE, i]
     lift = share * weight
     return (
         along * x + lift * rx,
@@ -130,12 +135,12 @@ def describe_pose(
     poses: Array,
     results: Array,
     p: int,
-    work: tuple[Array, Array],
+    work: tuple[Array, Array, Array],
     out: States,
 ) -> bool:
     """Fill the outputs of pose `p`. False, and NaN, for straight cables and for a pose without lengths."""
     code, k_h, k_p, behind = terms
-    rotation, rows = work
+    rotation, rows, more = work
     matrix, slopes = out.matrices[p], out.slopes[p]
     if code == codes.STRAIGHT or math.isnan(results[tables.LENGTH, p, 0]):
         matrix[:] = math.nan
@@ -151,11 +156,11 @@ def describe_pose(
     f.platform_stiffness(model, cables, rows, matrix)
     for i in range(rows.shape[1]):
         block, lever, force = out.blocks[p, i], out.levers[p, i], out.forces[p, i]
-        _describe_cable(model, cables, rows, i, block, slopes, lever)
+        _describe_cable(model, cables, rows, i, block, slopes, lever, more)
         force[0] = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
         force[1] = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
         force[2] = rows[g.VERTICAL, i]
-        parts = _at_frame_end(model, cables, rows, i)
+        parts = _at_frame_end(model, cables, rows, i, more)
         _fill_tension_slopes(parts, block, slopes[BY_LENGTH, i], lever, out.tensions[p, i])
     return True
 
@@ -175,8 +180,9 @@ def describe_states(
     """
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, results.shape[2])
+    more, rest = block(rest, SLOPES, 5)
     for p in range(poses.shape[0]):
-        describe_pose(model, robots, poses, results, p, (rotation, rows), States(*found))
+        describe_pose(model, robots, poses, results, p, (rotation, rows, more), States(*found))
 
 
 SINGULAR = 1e-14  # smallest determinant of a regular matrix that is scaled to diagonal elements of 1
@@ -319,6 +325,7 @@ def sensitivities_of_states(
     state, out = States(*states), _Sensitivities(*found)
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, m)
+    more, rest = block(rest, SLOPES, 5)
     work, rest = block(rest, 2 * n + 1, n)
     wrenches, rest = block(rest, 6, m)
     wide, rest = block(rest, 6, 3 * m)
@@ -326,7 +333,7 @@ def sensitivities_of_states(
     matrix, rest = block(rest, n, m)
     q, rest = block(rest, m + 1, m)
     for p in range(poses.shape[0]):
-        known = describe_pose(model, robots, poses, results, p, (rotation, rows), state)
+        known = describe_pose(model, robots, poses, results, p, (rotation, rows, more), state)
         if not known or not _fill_compliance(robots[0], state.matrices[p], work, out.compliances[p]):
             out.compliances[p] = math.nan
             out.by_data[p] = math.nan
