@@ -23,6 +23,7 @@ from matplotlib.path import Path
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
+from sagline.plot.labels import ABOVE as LEGEND
 from sagline.plot.labels import legend_columns
 from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, Sheet, cable_look, format_axes, svg_text, unique_names
 from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
@@ -134,24 +135,8 @@ def legend_above(ax: Axes, title: str = "") -> None:
     rows = ceil(len(labels) / columns) + bool(title)
     grown = (1.45 * rows + 0.4) * NAME_SIZE * POINT
     _grow(figure, grown)
-    ax.legend(
-        handles,
-        labels,
-        title=title or None,
-        alignment="left",
-        fontsize=NAME_SIZE,
-        title_fontsize=NAME_SIZE,
-        frameon=False,
-        ncols=columns,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.2,
-        borderpad=0.1,
-        labelspacing=0.25,
-        handlelength=1.8,
-        handletextpad=0.5,
-        columnspacing=1.2,
-    )
+    look = {**LEGEND, "fontsize": NAME_SIZE, "title_fontsize": NAME_SIZE, "ncols": columns}
+    ax.legend(handles, labels, title=title or None, **look, borderaxespad=0.2, labelspacing=0.25)
 
 
 def _grow(figure: Sheet, more: float) -> None:

@@ -62,10 +62,7 @@ class StopObserver:
     def cycle(self, cycle: control.Recorded) -> None:
         """Update all observations with the data of one cycle."""
         answer = cycle.answer
-        if not isinstance(answer, control.Sample) or cycle.state not in (
-            control.State.MOVING,
-            control.State.IDLE,
-        ):
+        if not isinstance(answer, control.Sample) or cycle.state not in (control.State.MOVING, control.State.IDLE):
             return
         self.cycles += 1
         if self._tell is not None and self.cycles % round(1.0 / PERIOD) == 0:

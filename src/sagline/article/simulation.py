@@ -143,9 +143,8 @@ def _smoothness(run: sl.Confirmation) -> dict[str, float]:
     }
 
 
-LIMITS = np.array(
-    [15.0, 17.0, 18.0, 18.5, 19.0, 19.5, 20.0, 22.5, 25.0, 30.0, 40.0, 50.0]
-)  # lower limits of the chord tension in the study [N]
+# lower limits of the chord tension in the study [N]
+LIMITS = np.array([15.0, 17.0, 18.0, 18.5, 19.0, 19.5, 20.0, 22.5, 25.0, 30.0, 40.0, 50.0])
 CORNER = (5.0, 3.5, 1.5)  # corner of the path [m], to which the figure refers
 FLOOR = 1e-9  # smallest drawn distance [m]
 NEAR = 1.05  # a tension is near its minimum if it is less than this multiple of the lower limit

@@ -38,6 +38,11 @@ MOST = 0.3  # largest width of names next to the axes, as a share of the figure'
 SPACING = 1.15  # distance between two names, in units of the text size
 END = 0.02  # a line that ends farther from the right side (share of the axes' width) has no name there
 LEADER = 8.0  # distance from the end of a line to its name [pt]
+# arguments of a legend above its axes
+ABOVE: dict[str, Any] = {
+    "loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "alignment": "left", "frameon": False,
+    "borderpad": 0.1, "handlelength": 1.8, "handletextpad": 0.5, "columnspacing": 1.2,
+}  # fmt: skip
 
 
 def name_lines(ax: Axes, title: str = "") -> None:
@@ -65,11 +70,7 @@ def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, 
     look = current()
     width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
     columns = legend_columns([*labels, title], 0.85 * width, look.tick)
-    return {
-        "loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": columns,
-        "fontsize": look.tick, "title_fontsize": look.tick, "alignment": "left", "frameon": False,
-        "borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8, "handletextpad": 0.5, "columnspacing": 1.2,
-    }  # fmt: skip
+    return {**ABOVE, "ncols": columns, "fontsize": look.tick, "title_fontsize": look.tick, "borderaxespad": 0.1}
 
 
 def legend_columns(labels: Sequence[str], width: float, size: float) -> int:

@@ -57,9 +57,6 @@ def simulate(
 ) -> Simulation:
     """Simulate a robot. The platform is a free body on exact cables, and the winches change the cable lengths.
 
-    Without cable mass ("none"), cables are static catenaries at every instant, with the pulleys and dead lengths of the
-    robot. They become slack if their lengths are too long.
-
     The set points are the lengths of the plan at its samples. Between samples they are cubic functions of time; their
     slopes at the samples are the `length_rate` of the plan. The set points are closer to the exact lengths if the path
     has more samples. A sample rate of 1 kHz is recommended.
@@ -73,9 +70,10 @@ def simulate(
             of the table of lengths.
         step: Time step of the integrator [s]. None: 0.2 rad divided by the highest angular frequency with taut,
             massless cables, at most 1 ms.
-        cable_mass: "none": cables are static catenaries at every instant. "lumped": each cable is a chain of nodes with
-            its mass, at fixed material points; it swings and transmits waves. Nodes are created at the frame while
-            cable is paid out, and merged while it is wound in. A chain keeps the initial exit point of its pulley.
+        cable_mass: "none": cables are static catenaries at every instant, with the pulleys and dead lengths of the
+            robot; they become slack if their lengths are too long. "lumped": each cable is a chain of nodes with its
+            mass, at fixed material points; it swings and transmits waves. Nodes are created at the frame while cable
+            is paid out, and merged while it is wound in. A chain keeps the initial exit point of its pulley.
             "modal": small motion about an equilibrium, with decoupled modes of `vibration`; lengths and wrench may
             change, and `Damping` may have modal_damping. Not supported: pulleys, events, winches, wind.
         nodes: Elements per cable with mass at the start, 4 to 500. The pose error at rest is of the order nodes^-2.
