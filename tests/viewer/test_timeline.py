@@ -66,7 +66,6 @@ def growing(log: PlayedLog) -> Iterator[Shown]:
         for name in (each.name for each in fields(log))
         if isinstance(value := getattr(log, name), np.ndarray)
     }
-    del cycles["shown"]
     yield from shown(lambda server: Page(server, FEATURES, log.robot, changed(log, **cycles)))
 
 
