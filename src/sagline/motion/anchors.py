@@ -77,18 +77,30 @@ class AnchorMotion(Shown):
         return self._interpolated(self._checked(time), 0)
 
     def velocity(self, time: ArrayLike) -> Array:
-        """Velocities of the anchors at given times [m/s], shape (..., m, 3); see `at`.
+        """Velocities of the anchors at given times.
 
         Args:
             time: Times [s], shape (...), from the first to the last sample.
+
+        Returns:
+            Velocities of the anchors [m/s], shape (..., m, 3).
+
+        Raises:
+            InvalidValueError: If a time is outside the samples.
         """
         return self._interpolated(self._checked(time), 1)
 
     def acceleration(self, time: ArrayLike) -> Array:
-        """Accelerations of the anchors at given times [m/s^2], shape (..., m, 3); see `at`.
+        """Accelerations of the anchors at given times.
 
         Args:
             time: Times [s], shape (...), from the first to the last sample.
+
+        Returns:
+            Accelerations of the anchors [m/s^2], shape (..., m, 3).
+
+        Raises:
+            InvalidValueError: If a time is outside the samples.
         """
         return self._interpolated(self._checked(time), 2)
 
