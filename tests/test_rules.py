@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from tests.mutants.__main__ import mutants
 from tests.tiers import extended
 from tools import prose, size
 
@@ -115,3 +116,7 @@ def test_the_project_is_in_plain_english() -> None:
 def test_public_functions_have_their_sections() -> None:
     assert size.without_args() == []
     assert size.without_examples() == []
+
+
+def test_every_listed_mistake_replaces_one_place_of_the_source() -> None:
+    assert len(list(mutants())) > 100  # an entry that does not is an error of the list
