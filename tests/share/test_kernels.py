@@ -42,7 +42,7 @@ def planar() -> sl.Robot:
 
 ROBOTS = {name: sl.load_robot(name) for name in sl.robot_names()}
 ROBOTS |= {"frame-end": frame_end_limited(), "planar": planar()}
-CHOSEN = ("falcon-7", "cogiro", "fast", "ipanema-2-pulleys", "frame-end", "planar")
+CHOSEN = ("article-mixed", "falcon-7", "cogiro", "fast", "ipanema-2-pulleys", "frame-end", "planar")
 
 
 def poses(robot: sl.Robot, count: int) -> sl.Pose:
@@ -93,7 +93,7 @@ class Answers:
     def __init__(self, name: str, count: int, folder: Path) -> None:
         self.robot = ROBOTS[name]
         self.pose = poses(self.robot, count)
-        self.plan = sl.inverse(self.robot, self.pose)
+        self.plan = sl.inverse(self.robot, self.pose, stability=False)
         self.rows = rows_of(self.plan)
         answer = json.loads(in_node(model_data(self.robot), self.rows, repeat=3))
         self.found: list[dict[str, Any]] = answer["found"]
@@ -122,7 +122,7 @@ def test_the_package_agrees_with_the_library(answers: Answers) -> None:
     for i in held:
         rest = sl.forward(answers.robot, answers.rows[i]["given"], start=answers.pose[i])
         assert found[i]["rest"]["status"] == rest.status
-        assert found[i]["rest"]["solved"]
+        assert found[i]["rest"]["solved"] == rest.solved
         turned = np.array(found[i]["rest"]["quaternion"])
         expected = rest.pose.quaternion * np.sign(turned @ rest.pose.quaternion)
         np.testing.assert_allclose(turned, expected, rtol=0.0, atol=1e-12)
