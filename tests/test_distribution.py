@@ -28,7 +28,7 @@ EXTRA_PACKAGES = (
     *("bokeh", "cma", "dask", "distributed", "fcl", "foxglove_schemas_protobuf", "mcap", "mcap_protobuf"),
     *("pymodbus", "pymoo", "skimage", "snap7", "trimesh", "viser", "zarr", "zstandard"),
 )
-MADE_FOR_EXTRAS = ("sagline.viewer", "sagline.twin.modbus_servers", "sagline.twin.s7_servers")
+MADE_FOR_EXTRAS = ("sagline.viewer", "sagline.torch", "sagline.twin.modbus_servers", "sagline.twin.s7_servers")
 USED = """
 import sys
 from importlib.resources import files
@@ -180,7 +180,7 @@ def test_the_wheel_works_in_another_environment(built: Built, tmp_path: Path) ->
 
 
 def test_only_modules_of_an_extra_require_it() -> None:
-    """Every module loads without the packages of all extras, except the viewer and the links to PLCs."""
+    """Every module loads without the packages of all extras, except the viewer, `torch` and the links to PLCs."""
     code = f"""
 import importlib, pkgutil, sys
 class Hidden:
