@@ -240,6 +240,16 @@ def calibration(robot: sl.Robot) -> None:
     sl.calibrate(robot, log, ["mass"])
 
 
+def swivel_angles(robot: sl.Robot) -> None:
+    """Fit of readings of swivel angles about slanted axes, whose zeros are unknown."""
+    places = np.random.default_rng(0).uniform(-0.2, 0.2, (5, 3)) + state_of(robot).pose.position
+    plan = sl.inverse(robot, sl.Pose(places, np.eye(3)))
+    sensors = sl.Sensors(tension_deviation=5.0, swivel_deviation=0.5)
+    cells, angles = plan.state.cables.frame_end_tension, np.zeros((5, robot.cable_count))
+    log = sl.WinchLog(unstrained_length=plan.unstrained_length, load_cells=cells, swivel=angles, sensors=sensors)
+    sl.calibrate(robot, log, ["mass", "swivel_zero"])
+
+
 def meshes() -> None:
     """Distances of cables from a body with corners."""
     corners = [[2.0, 1.0, 1.0], [3.0, 1.0, 1.0], [2.0, 2.0, 1.0], [2.0, 1.0, 2.0]]
@@ -284,7 +294,9 @@ def entries() -> None:
     for radius in (None, 0.03):
         sl.inverse(suspended(4, radius=radius), places(4, 4))
     slanted = sl.Winch(0.05, swivel_axis=[[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]] * 4, dead_cable=3.0)
-    there_and_back(sl.load_robot("cogiro").replace(winches=slanted), 4, 1)
+    turning = sl.load_robot("cogiro").replace(winches=slanted)
+    there_and_back(turning, 4, 1)
+    swivel_angles(turning)
     cables()
     winches()
     meshes()
