@@ -100,13 +100,9 @@ def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
             if isinstance(value, ResultArray):
                 outputs.append(array)
             return array
-        return (
-            np.ascontiguousarray(value)
-            if isinstance(value, np.ndarray)
-            else tuple(map(real, value))
-            if isinstance(value, tuple)
-            else value
-        )
+        if isinstance(value, tuple):
+            return tuple(map(real, value))
+        return np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value
 
     entry(*map(real, arguments))
     return outputs
@@ -188,6 +184,10 @@ class Kinematics:
         """Derivative at the results of `solve`."""
         raise NotImplementedError
 
+    def block(self, inputs: Sequence[Array]) -> int:
+        """Largest number of samples in one call of `solve`, for arrays of NumPy."""
+        return BLOCK
+
     @property
     def anchors(self) -> tuple[Value, Value]:
         """Frame anchors and platform anchors of the robot, (m, 3) each."""
@@ -241,18 +241,15 @@ class ForwardKinematics(Kinematics):
         lengths, wrench, frame, platform, start = inputs
         count, m, n, xp = len(lengths), self.cables, self.free, self.numpy
         given = *self.robots(frame, platform), lengths, start, wrench
-        works = [Work(shape, np.float64) for shape in ((CABLE_ROWS, m), (n, n), (tables.LAST_COLUMNS,))]
-        pose, results, _, _, status = self.call(
-            *(forward_poses, self.terms, False, given, tuple(works), self.memory),
-            (
-                *(
-                    ResultArray((count, tables.POSE_COLUMNS)),
-                    ResultArray((self.rows, count, m)),
-                    ResultArray((count, m), np.int8),
-                ),
-                *(ResultArray((count, tables.FORWARD_NUMBERS)), ResultArray((count,), np.int8)),
-            ),
+        works = tuple(Work(shape, np.float64) for shape in ((CABLE_ROWS, m), (n, n), (tables.LAST_COLUMNS,)))
+        found = (
+            ResultArray((count, tables.POSE_COLUMNS)),
+            ResultArray((self.rows, count, m)),
+            ResultArray((count, m), np.int8),
+            ResultArray((count, tables.FORWARD_NUMBERS)),
+            ResultArray((count,), np.int8),
         )
+        pose, results, _, _, status = self.call(forward_poses, self.terms, False, given, works, self.memory, found)
         stable = (status[:, None] == np.array(STABLE)).any(axis=1)[:, None]
         pose, results = xp.where(stable, pose, xp.nan), xp.where(stable, results, xp.nan)
         return pose, self.frame_end_tension(results), results.swapaxes(0, 1)
@@ -293,6 +290,11 @@ class InverseKinematics(Kinematics):
         super().__init__(robot, *given)
         check_sharing(self.robot, DEFAULT)
 
+    def block(self, inputs: Sequence[Array]) -> int:
+        """One sample if the target tensions differ, because all samples of a call have those of the first one."""
+        goals = inputs[-1].reshape(-1, self.cables)
+        return BLOCK if (goals == goals[:1]).all() else 1
+
     def solve(self, *inputs: Value) -> tuple[Value, Value, Value]:
         """Lengths (N, m), tensions (N, m), and results of the kernels (N, rows, m); NaN at an infeasible pose.
 
@@ -302,14 +304,17 @@ class InverseKinematics(Kinematics):
         count, m = len(pose), self.cables
         shared = goal[0] if count else self.numpy.zeros(m)
         method = codes.QUADRATIC_PROGRAM, 0.0, codes.CHORD_TENSION, self.numpy.ones(m), shared
+        given = self.robots(frame, platform), pose, wrench
+        found = (
+            ResultArray((self.rows, count, m)),
+            ResultArray((count, m), np.int8),
+            ResultArray((count, 2)),
+            ResultArray((count, self.free)),
+            ResultArray((count,), np.int8),
+        )
+        work = Work((m,), np.float64), self.memory
         results, *_ = self.call(
-            *(inverse_poses, self.model, method, self.limits, self.robots(frame, platform), pose, wrench),
-            *(Work((m,), np.float64), self.memory, None, False),
-            (
-                *(ResultArray((self.rows, count, m)), ResultArray((count, m), np.int8), ResultArray((count, 2))),
-                *(ResultArray((count, self.free)), ResultArray((count,), np.int8)),
-            ),
-            *(0, count),
+            inverse_poses, self.model, method, self.limits, *given, *work, None, False, found, 0, count
         )
         return results[tables.LENGTH], self.frame_end_tension(results), results.swapaxes(0, 1)
 
@@ -343,9 +348,7 @@ class InverseKinematics(Kinematics):
 
 def solve_batch(kinematics: Kinematics, inputs: Sequence[Array]) -> tuple[Array, ...]:
     """Results of `solve` for arrays of NumPy with equal leading axes."""
-    goals = inputs[-1].reshape(-1, inputs[-1].shape[-1])
-    alike = isinstance(kinematics, ForwardKinematics) or (goals == goals[:1]).all()
-    return _in_blocks(kinematics.solve, inputs, BLOCK if alike else 1)
+    return _in_blocks(kinematics.solve, inputs, kinematics.block(inputs))
 
 
 def push_batch(kinematics: Kinematics, changes: Sequence[Array], solved: Sequence[Array]) -> tuple[Array, ...]:
