@@ -88,10 +88,8 @@ def swivel_rows(
     (reach, levers, matrix), m, zero = _reach(robot, poses), robot.cable_count, _zero_directions(robot)
     if turned is None:
         along, across = (np.sum(reach * direction, axis=2)[..., None] for direction in zero)
-        by_end, by_data = (
-            (along * zero[1] - across * zero[0]) / (along**2 + across**2),
-            np.zeros((*along.shape[:2], DATA)),
-        )
+        by_end = (along * zero[1] - across * zero[0]) / (along**2 + across**2)
+        by_data = np.zeros((*along.shape[:2], DATA))
     else:
         reach, by_end, by_data = turned[..., :3], turned[..., 3:6], turned[..., 6:]
     by_pose = np.concatenate((by_end, np.cross(levers, by_end)), axis=2)
@@ -110,7 +108,7 @@ def swivel_rows(
                 slopes[:, i, where[row, i]] += scale[row, i] * change
     residual = np.zeros(reach.shape[:2])
     if readings is not None:
-        residual = _wrapped(readings - _angles_about(reach, zero) - zeros)
+        residual = _principal_angles(readings - _angles_about(reach, zero) - zeros)
     return FurtherRows(residual, slopes, by_length)
 
 
@@ -235,7 +233,7 @@ def _change_data(
             at.inertia[(begin + q) * rows : (begin + q + 1) * rows] += sign * change
 
 
-def _wrapped(angles: Array) -> Array:
+def _principal_angles(angles: Array) -> Array:
     """Angles between -pi and pi [rad] that differ from `angles` by full turns."""
     return np.asarray(np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi)
 

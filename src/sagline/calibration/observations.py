@@ -160,13 +160,8 @@ class MachineTerms(NamedTuple):
         """The machine with other unknowns. Unknown pulley radii and dead lengths need routing, even if zero."""
         routed = self.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
         terms, cables, winches = (*self.terms[:-1], routed or None), self.cables, self.robot.winches
-        radii = (parameters.where[kinds.RADIUS] >= 0).any()
-        if (
-            radii
-            and winches is not None
-            and cables.shape[2] == tables.CABLE_COLUMNS
-            and winches.swivel_axis[:, :2].any()
-        ):
+        radii, plain = (parameters.where[kinds.RADIUS] >= 0).any(), cables.shape[2] == tables.CABLE_COLUMNS
+        if radii and plain and winches is not None and winches.swivel_axis[:, :2].any():
             cables = locked(slanted_rows(self.robot)[None])  # eyelets that may become pulleys
         slopes = slopes_of_values(self.robot, parameters)
         return self._replace(parameters=parameters, terms=terms, cables=cables, slopes=slopes)
@@ -197,9 +192,8 @@ class MachineTerms(NamedTuple):
         stiffness = robot.cables.axial_stiffness
         strain = winches.winding_tension / stiffness
         slopes[2] = lengths * strain / (stiffness * (1.0 + strain))
-        if (
-            winches.drum_distance is None and (winches.layers == 1.0).all()
-        ):  # all turns on the drum have the same length
+        alike = winches.drum_distance is None and (winches.layers == 1.0).all()
+        if alike:  # all turns on the drum have the same length
             slopes[0] = 1.0 / (1.0 + strain)
             if with_radius:
                 radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
