@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import pytest
 from matplotlib.figure import Figure
 
-from sagline.article.drawing import Drawings
+from sagline.article import drawing
 from sagline.article.report import ArticleReport, write_article
 from sagline.present.page import Panel
 from tests.tiers import wide
@@ -30,14 +30,14 @@ class Written(NamedTuple):
 
 def written_with_figures(folder: Path, parts: tuple[str, ...] = ()) -> Written:
     figures: list[tuple[str, Figure]] = []
-    panel = Drawings.panel
+    panel = drawing.panel_of
 
-    def report_kept_for_all_tests(self: Drawings, figure: Any, caption: str, legend: str = "") -> Panel:
+    def report_kept_for_all_tests(name: str, figure: Any, caption: str, legend: str = "") -> Panel:
         figures.append((caption, figure))
-        return panel(self, figure, caption, legend)
+        return panel(name, figure, caption, legend)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Drawings, "panel", report_kept_for_all_tests)
+        patch.setattr(drawing, "panel_of", report_kept_for_all_tests)
         report = write_article(folder, parts)
     return Written(report, figures, not parts)
 

@@ -15,7 +15,7 @@ import sagline as sl
 from sagline.cli.installation import cache
 from sagline.files.execution_file import save_execution
 from sagline.kernels.sources import SUFFIX
-from sagline.sweep.file import load_sweep
+from sagline.sweep.request import load_sweep
 from sagline.twin.injected import fault
 from tests.abuse.reading import READERS
 from tests.calibration.made_up import made_up

@@ -8,30 +8,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from matplotlib.axes import Axes
 
-from sagline.article.drawing import Drawings, axes, chapter, finding, shades
-from sagline.article.regressions import (
-    ANGLE,
-    PUBLISHED_K_H,
-    PUBLISHED_K_P,
-    SHALLOW_K_H,
-    SHALLOW_K_P,
-    Constants,
-    End,
-    InterceptStudy,
-    SagStudy,
-    constants,
-    intercept_studies,
-    published_range,
-    published_sampling,
-    sag_study,
-    simulated_cable,
-    stretch_study,
-)
+from sagline.article import regressions as fits
+from sagline.article.drawing import Drawing, axes, chapter, finding, shades
 from sagline.cables.model import CableState
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, PURPLE, VERMILLION
-from sagline.present.page import Chapter, Finding, Panel, table_of
+from sagline.present.page import Chapter, Finding, table_of
 
 MIDDLE, DENSE = 2, -1  # indices of the angle 0.754 rad and of the largest density among the samples
 LOWEST = np.geomspace(40.0, 800.0, 12)  # values of the lowest sampled tension [N]
@@ -41,27 +24,26 @@ FACTORS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 
 def intercept_chapter() -> Chapter:
     """Chapter about figures 6 and 7."""
-    sampling = published_sampling()
-    platform, frame = intercept_studies(sampling)
-    draw = Drawings("intercept")
+    sampling = fits.published_sampling()
+    platform, frame = fits.intercept_studies(sampling)
     return chapter(
         "intercept",
-        (_over_chord(platform, frame, draw), _over_density(platform, frame, draw)),
+        (_over_chord(platform, frame), _over_density(platform, frame)),
         **{name: getattr(sampling, name)[[0, -1]] for name in ("chords", "densities", "tensions")},
     )
 
 
 def constants_chapter() -> Chapter:
     """Chapter about the dependence of k_h and k_p on the sampled tensions."""
-    sampling, draw = published_sampling(), Drawings("constants")
-    found = published_range(sampling)
-    over_lowest = [constants(sampling.between(low, found.highest)) for low in LOWEST]
-    over_highest = [constants(sampling.between(found.lowest, high)) for high in HIGHEST]
-    scaled = [constants(sampling.between(f * found.lowest, f * found.highest)) for f in FACTORS]
-    return chapter("constants", (_range(found, over_lowest, over_highest, draw), _limit(scaled, draw)))
+    sampling = fits.published_sampling()
+    found = fits.published_range(sampling)
+    over_lowest = [fits.constants(sampling.between(low, found.highest)) for low in LOWEST]
+    over_highest = [fits.constants(sampling.between(found.lowest, high)) for high in HIGHEST]
+    scaled = [fits.constants(sampling.between(f * found.lowest, f * found.highest)) for f in FACTORS]
+    return chapter("constants", (_range(found, over_lowest, over_highest), _limit(scaled)))
 
 
-def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings) -> Finding:
+def _over_chord(platform: fits.InterceptStudy, frame: fits.InterceptStudy) -> Finding:
     sampling = platform.sampling
     figure, ax = axes("$D$ [m]", r"$b_\pi$ [N]")
     picked = range(1, sampling.densities.size, 2)
@@ -74,7 +56,7 @@ def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings)
         "b-over-chord",
         numbers={"nonproportional_share_platform": platform.bend, "nonproportional_share_frame": frame.bend},
         panels=(
-            draw.panel(
+            (
                 figure,
                 "b_π at φ = 0.754 rad: platform end (circles, solid), frame end (squares, dashed).",
                 r"$\rho$ [kg/m]",
@@ -83,7 +65,7 @@ def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings)
     )
 
 
-def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings) -> Finding:
+def _over_density(platform: fits.InterceptStudy, frame: fits.InterceptStudy) -> Finding:
     sampling = platform.sampling
     figure, ax = axes(r"$\rho$ [kg/m]", r"$h_b$ [N/m]")
     for k, color in enumerate(shades(sampling.angles.size)):
@@ -100,24 +82,24 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
             "k_h_platform": platform.k_h,
             "k_h_frame_of_angle": frame.k_h_of_angle,
             "k_h_platform_of_angle": platform.k_h_of_angle,
-            "half_gravity": SHALLOW_K_H,
+            "half_gravity": fits.SHALLOW_K_H,
             "k_h_spread_over_angles": spread,
         },
-        panels=(draw.panel(figure, caption, r"$\varphi$ [rad]"),),
+        panels=((figure, caption, r"$\varphi$ [rad]"),),
     )
 
 
 def _range(
-    found: Constants, over_lowest: Sequence[Constants], over_highest: Sequence[Constants], draw: Drawings
+    found: fits.Constants, over_lowest: Sequence[fits.Constants], over_highest: Sequence[fits.Constants]
 ) -> Finding:
     figure, ax = axes("lowest sampled $T_x$ [N]", "$k_p$ [m²/s⁴]")
     _course(ax, over_lowest, "lowest", "k_p", BLUE, "regression")
-    _references(ax, PUBLISHED_K_P, SHALLOW_K_P, "$g^2/24$")
+    _references(ax, fits.PUBLISHED_K_P, fits.SHALLOW_K_P, "$g^2/24$")
     _logarithmic(ax, (50, 100, 200, 500))
     second, bx = axes("highest sampled $T_x$ [N]", "$|k_h|$ [m/s²]")
     _course(bx, over_highest, "highest", "k_h_frame", BLUE, "frame end")
     _course(bx, over_highest, "highest", "k_h_platform", PURPLE, "platform end")
-    _references(bx, PUBLISHED_K_H, SHALLOW_K_H, "$g/2$")
+    _references(bx, fits.PUBLISHED_K_H, fits.SHALLOW_K_H, "$g/2$")
     _logarithmic(bx, (500, 2000, 10_000, 40_000))
     all_k_p = [c.k_p for c in over_lowest]
     return finding(
@@ -128,8 +110,8 @@ def _range(
             "over_highest": [c._asdict() for c in over_highest],
         },
         panels=(
-            draw.panel(figure, f"k_p over the lowest tension; the highest is {n(found.highest, '.3g', 'N')}."),
-            draw.panel(second, f"|k_h| over the highest tension; the lowest is {n(found.lowest, '.3g', 'N')}."),
+            (figure, f"k_p over the lowest tension; the highest is {n(found.highest, '.3g', 'N')}."),
+            (second, f"|k_h| over the highest tension; the lowest is {n(found.lowest, '.3g', 'N')}."),
         ),
         k_h=abs(found.k_h_frame),
         least_k_p=min(all_k_p),
@@ -137,9 +119,9 @@ def _range(
     )
 
 
-def _limit(scaled: Sequence[Constants], draw: Drawings) -> Finding:
+def _limit(scaled: Sequence[fits.Constants]) -> Finding:
     figure, ax = axes("factor of both ends of the range", "deviation from the limit [%]")
-    limits = {"k_p": SHALLOW_K_P, "k_h_frame": SHALLOW_K_H, "k_h_platform": SHALLOW_K_H}
+    limits = {"k_p": fits.SHALLOW_K_P, "k_h_frame": fits.SHALLOW_K_H, "k_h_platform": fits.SHALLOW_K_H}
     labels = {"k_p": "$k_p$ from $g^2/24$", "k_h_frame": "$|k_h|$, frame end", "k_h_platform": "$|k_h|$, platform end"}
     for (name, limit), color in zip(limits.items(), (BLUE, VERMILLION, PURPLE), strict=True):
         away = [100.0 * abs(abs(getattr(c, name)) / limit - 1.0) for c in scaled]
@@ -147,17 +129,17 @@ def _limit(scaled: Sequence[Constants], draw: Drawings) -> Finding:
     _logarithmic(ax, tuple(FACTORS.astype(int)))
     return finding(
         "taut-limit",
-        numbers={"scaled": [c._asdict() for c in scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
-        panels=(draw.panel(figure, "Deviation of |k_h| from g/2, and of k_p from g²/24."),),
+        numbers={"scaled": [c._asdict() for c in scaled], "factors": FACTORS, "g_squared_over_24": fits.SHALLOW_K_P},
+        panels=((figure, "Deviation of |k_h| from g/2, and of k_p from g²/24."),),
         data=(
             table_of(
                 "The constants by the article's regressions",
                 ("factor", [*(f"{factor:g}" for factor in FACTORS), "limit"], ""),
                 ("lowest T_x [N]", [*(c.lowest for c in scaled), "∞"], ",.0f"),
                 ("highest T_x [N]", [*(c.highest for c in scaled), "∞"], ",.0f"),
-                ("k_h platform end [m/s²]", [*(c.k_h_platform for c in scaled), SHALLOW_K_H], "+.5f"),
-                ("k_h frame end [m/s²]", [*(c.k_h_frame for c in scaled), -SHALLOW_K_H], ".5f"),
-                ("k_p [m²/s⁴]", [*(c.k_p for c in scaled), SHALLOW_K_P], ".5f"),
+                ("k_h platform end [m/s²]", [*(c.k_h_platform for c in scaled), fits.SHALLOW_K_H], "+.5f"),
+                ("k_h frame end [m/s²]", [*(c.k_h_frame for c in scaled), -fits.SHALLOW_K_H], ".5f"),
+                ("k_p [m²/s⁴]", [*(c.k_p for c in scaled), fits.SHALLOW_K_P], ".5f"),
             ),
         ),
         factor=FACTORS[-1],
@@ -165,7 +147,7 @@ def _limit(scaled: Sequence[Constants], draw: Drawings) -> Finding:
     )
 
 
-def _course(ax: Axes, course: Sequence[Constants], x: str, y: str, color: str, label: str) -> None:
+def _course(ax: Axes, course: Sequence[fits.Constants], x: str, y: str, color: str, label: str) -> None:
     places, values = ([abs(getattr(c, name)) for c in course] for name in (x, y))
     ax.plot(places, values, "o-", color=color, markersize=3.0, linewidth=1.1, label=label)
 
@@ -190,40 +172,38 @@ DRAWN = (1, 3, 5, 7, 9)  # indices of the densities that are drawn
 
 def sag_chapter() -> Chapter:
     """Chapter about the regressions that lead from the adjusting length to k_p."""
-    end = End.at_angle(CHORD)
-    stiff, soft, printed, right = stretch_study(simulated_cable(), end, TENSIONS)
-    sag, draw = sag_study(published_sampling()), Drawings("sag")
+    end = fits.End.at_angle(CHORD)
+    stiff, soft, printed, right = fits.stretch_study(fits.simulated_cable(), end, TENSIONS)
+    sag = fits.sag_study(fits.published_sampling())
     return chapter(
         "sag",
         (
-            _with_stretch(stiff, soft, draw),
-            _relieved(stiff, printed, right, draw),
-            _tension(sag, draw),
-            _chord(sag, draw),
-            _angle(sag, draw),
-            _density(sag, draw),
+            _with_stretch(stiff, soft),
+            _relieved(stiff, printed, right),
+            _tension(sag),
+            _chord(sag),
+            _angle(sag),
+            _density(sag),
         ),
         chord=CHORD,
     )
 
 
-def _with_stretch(stiff: CableState, soft: CableState, draw: Drawings) -> Finding:
+def _with_stretch(stiff: CableState, soft: CableState) -> Finding:
     figure, ax = axes("$T_x$ [N]", "$d$ [mm]")
     ax.plot(stiff.horizontal_tension, 1e3 * stiff.adjusting_length, color=BLUE, linewidth=1.3, label="does not stretch")
     ax.plot(stiff.horizontal_tension, 1e3 * soft.adjusting_length, color=VERMILLION, linewidth=1.3, label="stretches")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    hooke = stiff.platform_end_tension[-1] * CHORD / float(simulated_cable().axial_stiffness)
+    hooke = stiff.platform_end_tension[-1] * CHORD / float(fits.simulated_cable().axial_stiffness)
     numbers = {
         "least_unstretchable_m": stiff.adjusting_length.min(),
         "last_stretchable_m": soft.adjusting_length[-1],
         "share_of_hooke": -soft.adjusting_length[-1] / hooke,
     }
-    return finding(
-        "d-over-tension", numbers=numbers, panels=(draw.panel(figure, "Adjusting length as a function of T_x."),)
-    )
+    return finding("d-over-tension", numbers=numbers, panels=((figure, "Adjusting length as a function of T_x."),))
 
 
-def _relieved(stiff: CableState, printed: Array, right: Array, draw: Drawings) -> Finding:
+def _relieved(stiff: CableState, printed: Array, right: Array) -> Finding:
     """Finding about lengths [m] without elongation: `printed` by (36) and (38), `right` by the mean tension."""
     force, length = stiff.platform_end_tension, stiff.adjusting_length
     off, left = (1e3 * (each - length) for each in (printed, right))
@@ -239,13 +219,13 @@ def _relieved(stiff: CableState, printed: Array, right: Array, draw: Drawings) -
         "stretch-removed",
         numbers=numbers,
         panels=(
-            draw.panel(figure, "d over |T|: of the cable that does not stretch, and of the elastic cable with (38)."),
-            draw.panel(second, "The difference between both."),
+            (figure, "d over |T|: of the cable that does not stretch, and of the elastic cable with (38)."),
+            (second, "The difference between both."),
         ),
     )
 
 
-def _tension(study: SagStudy, draw: Drawings) -> Finding:
+def _tension(study: fits.SagStudy) -> Finding:
     tensions = study.sampling.tensions
     figure, ax = axes("$T_x$ [N]", "$d$ [m]")
     ax.set_xscale("log")
@@ -256,30 +236,25 @@ def _tension(study: SagStudy, draw: Drawings) -> Finding:
     share = study.adjusting_length / study.fitted_length
     numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
     return finding(
-        "d-model",
-        numbers=numbers,
-        panels=(draw.panel(figure, f"d {_middle_and_dense(study)}, with fits.", "$D$ [m]"),),
+        "d-model", numbers=numbers, panels=((figure, f"d {_middle_and_dense(study)}, with fits.", "$D$ [m]"),)
     )
 
 
-def _chord(study: SagStudy, draw: Drawings) -> Finding:
+def _chord(study: fits.SagStudy) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, sampling.chords[-1], 80)
     fits = study.q_a[:, DENSE, None] * fine**3
     courses = sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g")
-    captions = (
-        f"a_d {_middle_and_dense(study)} with its cubic (figure 11).",
-        "The same at five angles (figure 12).",
-    )
+    captions = (f"a_d {_middle_and_dense(study)} with its cubic (figure 11).", "The same at five angles (figure 12).")
     away = _away(study.fitted_a_d, study.a_d)
     return finding(
         "a-over-chord",
         numbers={"cubic_away_share": away},
-        panels=_course_panels(courses, ("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
+        panels=_course_panels(courses, ("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions),
     )
 
 
-def _angle(study: SagStudy, draw: Drawings) -> Finding:
+def _angle(study: fits.SagStudy) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, 0.5 * np.pi, 100)
     fits = study.p_q[[*DRAWN], None] * np.cos(fine) ** 4
@@ -293,11 +268,11 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
     return finding(
         "q-over-angle",
         numbers={"cos4_away_share": away},
-        panels=_course_panels(courses, (r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
+        panels=_course_panels(courses, (r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions),
     )
 
 
-def _density(study: SagStudy, draw: Drawings) -> Finding:
+def _density(study: fits.SagStudy) -> Finding:
     densities = study.sampling.densities
     fine = np.linspace(0.0, densities[-1], 80)
     figure, ax = axes(r"$\rho$ [kg/m]", "$p_q$ [N²/m²]")
@@ -305,19 +280,16 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     each = study.p_q / densities**2
     second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
     bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
-    _references(bx, PUBLISHED_K_P, SHALLOW_K_P, "$g^2/24$")
+    _references(bx, fits.PUBLISHED_K_P, fits.SHALLOW_K_P, "$g^2/24$")
     return finding(
         "p-over-density",
         numbers={
             "k_p": study.k_p,
-            "shallow_k_p": SHALLOW_K_P,
+            "shallow_k_p": fits.SHALLOW_K_P,
             "k_p_of_density": each,
             "densities_kg_per_m": densities,
         },
-        panels=(
-            draw.panel(figure, "p_q with the fitted parabola."),
-            draw.panel(second, "p_q/ρ²; by (45) it would not depend on ρ."),
-        ),
+        panels=((figure, "p_q with the fitted parabola."), (second, "p_q/ρ²; by (45) it would not depend on ρ.")),
         heaviest=each[-1],
     )
 
@@ -341,24 +313,24 @@ def _draw_courses(ax: Axes, courses: _Courses) -> None:
 
 
 def _course_panels(
-    courses: _Courses, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
-) -> tuple[Panel, Panel]:
+    courses: _Courses, labels: tuple[str, str, str], one: int, captions: tuple[str, str]
+) -> tuple[Drawing, Drawing]:
     """Two panels: the curve with the index `one`, and all curves; labels: label of x, label of y, title of legend."""
     x, rows, fine, fits, _ = courses
     figure, ax = axes(*labels[:2])
     _with_fit(ax, x, rows[one], fine, fits[one])
     second, bx = axes(*labels[:2])
     _draw_courses(bx, courses)
-    return draw.panel(figure, captions[0]), draw.panel(second, captions[1], labels[2])
+    return (figure, captions[0]), (second, captions[1], labels[2])
 
 
 def _named(values: Iterable[float], form: str) -> list[str]:
     return [format(value, form) for value in values]
 
 
-def _middle_and_dense(study: SagStudy) -> str:
+def _middle_and_dense(study: fits.SagStudy) -> str:
     """Part of a caption: angle and density of the drawn cables."""
-    return f"at φ = {n(ANGLE, unit='rad')}, ρ = {n(study.sampling.densities[DENSE], unit='kg/m')}"
+    return f"at φ = {n(fits.ANGLE, unit='rad')}, ρ = {n(study.sampling.densities[DENSE], unit='kg/m')}"
 
 
 def _away(fit: Array, values: Array) -> float:

@@ -8,10 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
-from itertools import count
 from math import ceil
 from string import Formatter
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 import matplotlib
 import numpy as np
@@ -54,7 +53,7 @@ def finding(
     numbers: dict[str, Any] | None = None,
     *,
     verdict: Verdict | None = None,
-    panels: Sequence[Panel] = (),
+    panels: Sequence[Drawing] = (),
     data: Sequence[Table] = (),
     **words: Any,
 ) -> Finding:
@@ -70,7 +69,7 @@ def finding(
         numbers=known,
         figures=tuple(entry.get("figures", ())),
         tables=tuple(entry.get("tables", ())),
-        panels=tuple(panels),
+        panels=tuple(panel_of(f"{key}-{k}", *drawing) for k, drawing in enumerate(panels)),
         data=tuple(data),
     )
 
@@ -100,21 +99,18 @@ LOOK: dict[str, Any] = {"colors": "black", "linestyles": "-", "linewidths": 0.8}
 MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins with space for a color bar
 
 
-class Drawings:
-    """Converter of figures to drawings of a page, in which all identifiers are unique."""
+# figure, caption, and the title of its legend; a figure has a legend if its curves have labels
+Drawing: TypeAlias = tuple[Sheet, str] | tuple[Sheet, str, str]
 
-    def __init__(self, page: str) -> None:
-        """Prepare drawings for a part of the page with the name `page`, with which all identifiers begin."""
-        self._names = (f"{page}-{k}-" for k in count(1))
 
-    def panel(self, figure: Sheet, caption: str, legend: str = "") -> Panel:
-        """Convert `figure` to a drawing of the page, with a legend (title `legend`) if the curves have labels."""
-        if figure.axes[0].get_legend_handles_labels()[1]:
-            legend_above(figure.axes[0], legend)
-        svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
-        svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page determines the size
-        svg = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(caption)}" ', 1)
-        return Panel(unique_names(svg, next(self._names)), caption)
+def panel_of(name: str, figure: Sheet, caption: str, legend: str = "") -> Panel:
+    """Convert a `Drawing` to a drawing of a page, whose identifiers begin with `name`."""
+    if figure.axes[0].get_legend_handles_labels()[1]:
+        legend_above(figure.axes[0], legend)
+    svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
+    svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page determines the size
+    svg = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(caption)}" ', 1)
+    return Panel(unique_names(svg, f"{name}-"), caption)
 
 
 def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
@@ -197,10 +193,10 @@ def cables_over_time(
 
 
 def error_panels(
-    names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str, draw: Drawings
-) -> list[Panel]:
+    names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str
+) -> list[Drawing]:
     """Draw errors as areas of circles at `position` (N, 3), in two views; `series`: label, errors, scale, color."""
-    panels = []
+    panels: list[Drawing] = []
     for column, name in ((0, "x"), (1, "y")):
         figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
         place = position[:, [column, 2]]
@@ -209,7 +205,7 @@ def error_panels(
         for point, at in zip(names, place, strict=True):
             ax.annotate(point, at, fontsize=TICK, ha="center", va="center")
         ax.margins(0.16)
-        panels.append(draw.panel(figure, caption.format(name)))
+        panels.append((figure, caption.format(name)))
     return panels
 
 

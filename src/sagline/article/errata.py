@@ -8,18 +8,8 @@ from typing import SupportsFloat, TypeAlias
 import numpy as np
 
 import sagline as sl
+from sagline.article import regressions as fits
 from sagline.article.drawing import chapter, finding
-from sagline.article.regressions import (
-    ANGLE,
-    GRAVITY,
-    PUBLISHED_K_P,
-    SHALLOW_K_P,
-    End,
-    article_sampling,
-    sag_study,
-    simulated_cable,
-    stretch_study,
-)
 from sagline.article.simulation import METHOD, ROBOTS
 from sagline.article.ten_poses import table2
 from sagline.core.arrays import Array
@@ -51,8 +41,8 @@ def _sign_of_intercept() -> Sequence[Number]:
     """Erratum 1: the line pi at the platform end has the intercept +wD/2; a wrong sign causes centimeters of error."""
     cable, chord = sl.load_robot(ROBOTS[0]).cables, 10.0
     angle = 0.754  # the article's angle [rad]
-    state = sl.Catenary().from_tension(cable, chord * np.cos(angle), chord * np.sin(angle), TAUT, GRAVITY)
-    half_weight = 0.5 * cable.linear_density * GRAVITY * chord / (1.0 + TAUT / cable.axial_stiffness)
+    state = sl.Catenary().from_tension(cable, chord * np.cos(angle), chord * np.sin(angle), TAUT, fits.GRAVITY)
+    half_weight = 0.5 * cable.linear_density * fits.GRAVITY * chord / (1.0 + TAUT / cable.axial_stiffness)
     intercept = state.vertical_force - np.tan(angle) * state.horizontal_tension
     published = sl.Empirical()
     numbers: list[Number] = [
@@ -158,15 +148,17 @@ def _largest(vector: Array) -> float:
 
 def _stretch_by_end_tension() -> Sequence[Number]:
     """Erratum 5: equation (36) computes the elongation with the tension at B instead of the mean tension."""
-    cable = simulated_cable()
-    end = End.at_angle(LONG)
-    stiff, soft, printed, right = stretch_study(cable, end, np.array([500.0]))
+    cable = fits.simulated_cable()
+    end = fits.End.at_angle(LONG)
+    stiff, soft, printed, right = fits.stretch_study(cable, end, np.array([500.0]))
     excess = float((printed - right)[0])
     length = end.chord + float(soft.adjusting_length[0])
-    formula = float(cable.linear_density * GRAVITY * length**2 * np.sin(ANGLE) / (2.0 * cable.axial_stiffness))
+    formula = float(
+        cable.linear_density * fits.GRAVITY * length**2 * np.sin(fits.ANGLE) / (2.0 * cable.axial_stiffness)
+    )
     return (
         ("error of (36), simulation's cable at 15 m", 1e3 * excess, "mm"),
-        ("the same divided by sin φ", 1e3 * excess / float(np.sin(ANGLE)), "mm"),
+        ("the same divided by sin φ", 1e3 * excess / float(np.sin(fits.ANGLE)), "mm"),
         ("wL² sin φ/(2EA)", 1e3 * formula, "mm"),
         (
             "d minus d of the unstretchable cable, after removal of the stretch by the mean tension",
@@ -178,12 +170,12 @@ def _stretch_by_end_tension() -> Sequence[Number]:
 
 def _sag_constant() -> Sequence[Number]:
     """Erratum 6: for cables with a small sag, k_p is g^2/24, not 4.385."""
-    sampling = article_sampling()
-    taut = sag_study(sampling.between(*(TAUTER * sampling.tensions[[0, -1]])))
+    sampling = fits.article_sampling()
+    taut = fits.sag_study(sampling.between(*(TAUTER * sampling.tensions[[0, -1]])))
     return (
-        ("g²/24", SHALLOW_K_P, "m²/s⁴"),
+        ("g²/24", fits.SHALLOW_K_P, "m²/s⁴"),
         ("k_p by the article's regressions, taut cables", taut.k_p, "m²/s⁴"),
-        ("increase of the sag term by the published value", 100.0 * (PUBLISHED_K_P / SHALLOW_K_P - 1.0), "%"),
+        ("increase of the sag term by the published value", 100.0 * (fits.PUBLISHED_K_P / fits.SHALLOW_K_P - 1.0), "%"),
     )
 
 
@@ -191,12 +183,12 @@ def _sign_in_bound() -> Sequence[Number]:
     """Erratum 7: the lower bound (54) of T_x has the wrong sign for a suspended cable."""
     from scipy.optimize import brentq
 
-    cable, chord = simulated_cable(), 10.0
-    span, rise = End.at_angle(chord) * np.array([1.0, -1.0])
-    slope, intercept = rise / span, 0.5 * float(cable.linear_density) * GRAVITY * chord
+    cable, chord = fits.simulated_cable(), 10.0
+    span, rise = fits.End.at_angle(chord) * np.array([1.0, -1.0])
+    slope, intercept = rise / span, 0.5 * float(cable.linear_density) * fits.GRAVITY * chord
 
     def vertical(tension: float) -> float:
-        return float(sl.Catenary().from_tension(cable, span, rise, tension * chord / span, GRAVITY).vertical_force)
+        return float(sl.Catenary().from_tension(cable, span, rise, tension * chord / span, fits.GRAVITY).vertical_force)
 
     turning = float(brentq(vertical, 0.1 * intercept, 10.0 * intercept))
     return (
@@ -210,10 +202,10 @@ def _vertical_and_level() -> Sequence[Number]:
     """Erratum 8: the equations fail for poses vertically below an anchor, and for poses with a horizontal cable."""
     robot = sl.load_robot(ROBOTS[0])
     under = robot.frame_anchors[0] - robot.platform_anchors[0] - [0.0, 0.0, 2.0]
-    cable, chord = simulated_cable(), 10.0
-    half_weight = 0.5 * float(cable.linear_density) * GRAVITY * chord
-    vertical = sl.Catenary().from_tension(cable, 0.0, -chord, 100.0, GRAVITY)
-    level = sl.Catenary().from_tension(cable, chord, 0.0, 100.0, GRAVITY)
+    cable, chord = fits.simulated_cable(), 10.0
+    half_weight = 0.5 * float(cable.linear_density) * fits.GRAVITY * chord
+    vertical = sl.Catenary().from_tension(cable, 0.0, -chord, 100.0, fits.GRAVITY)
+    level = sl.Catenary().from_tension(cable, chord, 0.0, 100.0, fits.GRAVITY)
     numbers: list[Number] = [("|tan φ| a microradian from vertical", abs(np.tan(0.5 * np.pi - NEARLY)), "")]
     for distance, label in ((1e-3, "1 mm"), (1e-6, "1 µm")):
         pose = sl.Pose.from_euler(under + np.array([distance, 0.0, 0.0]), 0.0, 0.0, 0.0)
@@ -286,17 +278,8 @@ def _printed_formulas() -> Sequence[Number]:
 
 
 _NUMBERS = (
-    _sign_of_intercept,
-    _gravity_twice,
-    _euler_rates,
-    _rank_of_h,
-    _stretch_by_end_tension,
-    _sag_constant,
-    _sign_in_bound,
-    _vertical_and_level,
-    _error_formula,
-    _table_number,
-    _printed_formulas,
+    *(_sign_of_intercept, _gravity_twice, _euler_rates, _rank_of_h, _stretch_by_end_tension, _sag_constant),
+    *(_sign_in_bound, _vertical_and_level, _error_formula, _table_number, _printed_formulas),
 )
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from sagline import control
-from sagline.article.drawing import Drawings, cables_over_time, chapter, error_panels, finding
+from sagline.article.drawing import Drawing, cables_over_time, chapter, error_panels, finding
 from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import plain
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Chapter, Finding, Panel, Table, page, table_of, write_page
+from sagline.present.page import Chapter, Finding, Table, page, table_of, write_page
 
 NAMES = ("experiment.html", "experiment.json")
 TITLE = "The experiment, repeated"
@@ -41,11 +41,8 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
 
 def experiment_chapter(result: Experiment, how: str) -> Chapter:
     """Chapter about the result of an experiment; how: sentence about the machine and its controller."""
-    draw = Drawings("experiment")
     return chapter(
-        "experiment",
-        (_stops(result), _cells(result, draw), _lengths(result, draw), _space(result, draw), _run(result)),
-        how=how,
+        "experiment", (_stops(result), _cells(result), _lengths(result), _space(result), _run(result)), how=how
     )
 
 
@@ -84,7 +81,7 @@ def _stops(result: Experiment) -> Finding:
     )
 
 
-def _cells(result: Experiment, draw: Drawings) -> Finding:
+def _cells(result: Experiment) -> Finding:
     off, cells, early = result.cells - result.planned, result.cells, result.time < JERK
     at_stops = result.tension - result.planned_tension
     return finding(
@@ -96,32 +93,32 @@ def _cells(result: Experiment, draw: Drawings) -> Finding:
             "off_plan_at_first_N": np.abs(off[early]).max(),
             "off_plan_at_stops_N": np.abs(at_stops).max(),
         },
-        panels=(_courses(result, cells, "load cells [N]", "Load cells; stops (dashed) take no time here.", draw),),
+        panels=(_courses(result, cells, "load cells [N]", "Load cells; stops (dashed) take no time here."),),
     )
 
 
-def _lengths(result: Experiment, draw: Drawings) -> Finding:
+def _lengths(result: Experiment) -> Finding:
     lengths = result.lengths
     caption = "Lengths from the encoders, minus the lengths at home. The ten stops (dashed) take no time here."
     return finding(
         "encoders",
         numbers={"least_m": lengths.min(), "largest_m": lengths.max()},
-        panels=(_courses(result, 1e3 * lengths, "$L - L_{home}$ [mm]", caption, draw),),
+        panels=(_courses(result, 1e3 * lengths, "$L - L_{home}$ [mm]", caption),),
     )
 
 
-def _courses(result: Experiment, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
-    return draw.panel(cables_over_time(result.time, values, label, 0.9, "cable {}", result.stops.tolist()), caption)
+def _courses(result: Experiment, values: Array, label: str, caption: str) -> Drawing:
+    return (cables_over_time(result.time, values, label, 0.9, "cable {}", result.stops.tolist()), caption)
 
 
-def _space(result: Experiment, draw: Drawings) -> Finding:
+def _space(result: Experiment) -> Finding:
     table = result.table
     series = [
         (f"{who}, largest {n(1e3 * errors.max(), '.2g', 'mm')}", errors, AREA / errors.max(), color)
         for who, errors, color in (("article", table.distance, VERMILLION), ("ours", result.distance, BLUE))
     ]
     caption = "The points in the {}-z plane; areas show the errors, on separate scales."
-    panels = error_panels(table.points, table.desired, series, caption, draw)
+    panels = error_panels(table.points, table.desired, series, caption)
     height = table.desired[:, 2]
     slopes = [float(np.polyfit(height, 1e3 * error[:, 2], 1)[0]) for error in (table.error, result.error)]
     return finding("space", numbers={"article_slope_mm_per_m": slopes[0], "slope_mm_per_m": slopes[1]}, panels=panels)

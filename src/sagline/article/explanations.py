@@ -162,10 +162,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
     else:
         names = ", ".join(parameter.name for parameter in models[moving[0]])
         raise sl.InvalidValueError(
-            f"the fit of {names}",
-            f"still moving after {ITERATIONS} steps",
-            "fits that converge",
-            "Omit this model.",
+            f"the fit of {names}", f"still moving after {ITERATIONS} steps", "fits that converge", "Omit this model."
         )
     found = error_of([_errors(*of) for of in zip(models, values, strict=True)])
     return tuple(_explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, chapter, finding, shades
+from sagline.article.drawing import axes, chapter, finding, shades
 from sagline.article.regressions import ANGLE, GRAVITY, End, FittedLine, fit_line, simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -86,16 +86,10 @@ def feasible_chapter() -> Chapter:
     """Chapter about the tensions for which the end of a cable is at a point, exactly or within a tolerance."""
     end = End.at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
-    draw = Drawings("feasible")
-    return chapter(
-        "feasible-sets",
-        (_psi(studies, draw), _curve(studies[0], draw), _line(studies[0], draw)),
-        chord=CHORD,
-        angle=ANGLE,
-    )
+    return chapter("feasible-sets", (_psi(studies), _curve(studies[0]), _line(studies[0])), chord=CHORD, angle=ANGLE)
 
 
-def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
+def _psi(studies: list[_FeasibleSets]) -> Finding:
     extents = np.array([np.ptp(study.psi[SHOWN, :, 0]) for study in studies])
     length = float(studies[0].psi_lengths[SHOWN])
     figure, ax = axes("$T_x$ [N]", "$T_z$ [N]")
@@ -121,8 +115,8 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
             "times_smaller": ratio,
         },
         panels=(
-            draw.panel(figure, f"The set ψ for L = {n(length, '.5g', 'm')} and three tolerances.", legend),
-            draw.panel(second, caption, legend),
+            (figure, f"The set ψ for L = {n(length, '.5g', 'm')} and three tolerances.", legend),
+            (second, caption, legend),
         ),
         extents=", ".join(
             (f"{n(x, '.3g', 'N')} at {n(1000.0 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
@@ -130,7 +124,7 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
     )
 
 
-def _curve(study: _FeasibleSets, draw: Drawings) -> Finding:
+def _curve(study: _FeasibleSets) -> Finding:
     figure, ax = axes("$T_x$ [N]", "$d = L - D$ [mm]")
     ax.plot(study.tensions, 1e3 * (study.lengths - CHORD), color=BLUE, linewidth=1.3, label=r"$\Psi$, exact")
     for k, (length, outline) in enumerate(zip(study.psi_lengths, study.psi, strict=True)):
@@ -147,11 +141,11 @@ def _curve(study: _FeasibleSets, draw: Drawings) -> Finding:
             "d_last_m": study.lengths[-1] - CHORD,
             "strictly_falling": bool(np.all(np.diff(study.lengths) < 0.0)),
         },
-        panels=(draw.panel(figure, "The curve Ψ over T_x, with the sets ψ of six lengths as segments."),),
+        panels=((figure, "The curve Ψ over T_x, with the sets ψ of six lengths as segments."),),
     )
 
 
-def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
+def _line(study: _FeasibleSets) -> Finding:
     line = study.line
     rest = study.vertical - (line.slope * study.tensions + line.intercept)
     taut = study.tensions >= LOW_PART
@@ -179,8 +173,8 @@ def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
             "taut_deviation_from_tangent_N": _largest(from_article[taut]),
         },
         panels=(
-            draw.panel(figure, "The projection of Ψ and the fitted line."),
-            draw.panel(second, "The difference: the exact T_z minus the line."),
+            (figure, "The projection of Ψ and the fitted line."),
+            (second, "The difference: the exact T_z minus the line."),
         ),
     )
 

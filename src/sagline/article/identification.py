@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, chapter, draw_errors, finding, map_axes, shades
+from sagline.article.drawing import axes, chapter, draw_errors, finding, map_axes, shades
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import UNITS, CableFit, identify_cable
 from sagline.article.regressions import simulated_cable
@@ -32,11 +32,10 @@ CASES = (  # for each set of synthetic measurements: lowest and highest chord te
 def identify_chapter() -> Chapter:
     """Chapter with results of `identify_empirical` for the simulated cable, and of `identify_cable`."""
     fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
-    draw = Drawings("identify")
-    return chapter("identify", (_constants(fit, draw), _limits(fit, draw), _measured()))
+    return chapter("identify", (_constants(fit), _limits(fit), _measured()))
 
 
-def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
+def _constants(fit: EmpiricalFit) -> Finding:
     figure, ax = map_axes("$T_x$ [N]", "span [m]")
     draw_errors(ax, fit.tensions, fit.spans, fit.position_error.max(axis=1), EDGES, TICKS, LINES)
     rows = [
@@ -54,7 +53,7 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
             "largest_position_error_m": fit.position_error.max(),
         },
         panels=(
-            draw.panel(
+            (
                 figure,
                 f"Position error (20), the largest value over all rises, for {len(fit.spans)} spans and "
                 f"{len(fit.tensions)} tensions.",
@@ -67,7 +66,7 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
     )
 
 
-def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
+def _limits(fit: EmpiricalFit) -> Finding:
     figure, ax = axes("lowest $T_x$ [N]", "largest cable weight $wL$ [N]")
     frontier = {}
     for tolerance, color in zip(TOLERANCES, shades(len(TOLERANCES)), strict=True):
@@ -81,7 +80,7 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
     return finding(
         "validity-limits",
         numbers={"limits": limits},
-        panels=(draw.panel(figure, caption, "position error"),),
+        panels=((figure, caption, "position error"),),
         data=(
             table_of(
                 "Limits that keep the position error (20) below a tolerance",

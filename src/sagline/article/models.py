@@ -10,12 +10,12 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, chapter, draw_errors, finding, logarithmic_with_floor, map_axes
+from sagline.article.drawing import Drawing, axes, chapter, draw_errors, finding, logarithmic_with_floor, map_axes
 from sagline.article.regressions import GRAVITY, simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import COLORS, LINE_STYLES, TICK
-from sagline.present.page import Chapter, Finding, Panel, Table
+from sagline.present.page import Chapter, Finding, Table
 
 MODELS: tuple[sl.CableModel, ...] = (
     sl.Straight(),
@@ -57,10 +57,9 @@ def sufficient_models(length_error: Array, tolerance: float) -> Array:
 def models_chapter() -> Chapter:
     """Chapter about the choice of the cable model in a controller."""
     cable = simulated_cable()
-    draw = Drawings("models")
     return chapter(
         "models",
-        (_maps(draw), _sufficient(draw), _slices(draw), _examples()),
+        (_maps(), _sufficient(), _slices(), _examples()),
         axial_stiffness=cable.axial_stiffness,
         reference=REFERENCE,
     )
@@ -72,26 +71,26 @@ def _study(**varied: Array) -> tuple[Array, Array]:
     return model_errors(float(simulated_cable().axial_stiffness), *at)
 
 
-def _maps(draw: Drawings) -> Finding:
+def _maps() -> Finding:
     errors = np.abs(_study(chord=CHORDS, tension=TENSIONS)[0][:-1, :, 0, 0, :])
     drawn = _study(chord=FINE_CHORDS, tension=FINE_TENSIONS)[0][:-1, :, 0, 0, :]
     within = {name: float(np.mean(error <= TOLERANCE)) for name, error in zip(NAMES[:-1], errors, strict=True)}
     return finding(
         "length-error-maps",
         numbers={"share_within_1_mm": within},
-        panels=[_map(error, f"{name}: length error.", draw) for name, error in zip(NAMES[:-1], drawn, strict=True)],
+        panels=[_map(error, f"{name}: length error.") for name, error in zip(NAMES[:-1], drawn, strict=True)],
         shares=", ".join(f"{name} {n(100 * share, '.3g', '%')}" for name, share in within.items()),
     )
 
 
-def _map(error: Array, caption: str, draw: Drawings) -> Panel:
+def _map(error: Array, caption: str) -> Drawing:
     figure, ax = map_axes("chord tension [N]", "chord [m]")
     _logarithmic(ax)
     draw_errors(ax, FINE_TENSIONS, FINE_CHORDS, error, EDGES, TICKS, LINES)
-    return draw.panel(figure, caption)
+    return figure, caption
 
 
-def _sufficient(draw: Drawings) -> Finding:
+def _sufficient() -> Finding:
     over_chord = sufficient_models(_study(chord=CHORDS, tension=TENSIONS)[0], TOLERANCE)
     fine = (
         _study(chord=FINE_CHORDS, tension=FINE_TENSIONS)[0][:, :, 0, 0, :],
@@ -103,14 +102,14 @@ def _sufficient(draw: Drawings) -> Finding:
         "sufficient-model",
         numbers={"share_of_map": shares},
         panels=(
-            _choice("chord [m]", FINE_CHORDS, fine[0], "Error over chord and tension.", draw),
-            _choice("linear density [kg/m]", FINE_DENSITIES, fine[1], "Error over density and tension.", draw),
-            _choice("angle below level [°]", -np.degrees(FINE_ANGLES), fine[2], "Error over angle and tension.", draw),
+            _choice("chord [m]", FINE_CHORDS, fine[0], "Error over chord and tension."),
+            _choice("linear density [kg/m]", FINE_DENSITIES, fine[1], "Error over density and tension."),
+            _choice("angle below level [°]", -np.degrees(FINE_ANGLES), fine[2], "Error over angle and tension."),
         ),
     )
 
 
-def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawings) -> Panel:
+def _choice(label: str, heights: Array, errors: Array, caption: str) -> Drawing:
     """Map that shows the least accurate sufficient model; `heights`: values on the vertical axis."""
     colors = matplotlib.colormaps["viridis_r"](0.9 * np.arange(len(NAMES)) / (len(NAMES) - 1))
     figure, ax = map_axes("chord tension [N]", label)
@@ -128,10 +127,10 @@ def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawi
     bar = figure.colorbar(scale, ax=ax, ticks=range(len(NAMES)), pad=0.02)
     bar.ax.set_yticklabels(NAMES, fontsize=TICK)
     bar.ax.tick_params(length=0.0)
-    return draw.panel(figure, caption)
+    return figure, caption
 
 
-def _slices(draw: Drawings) -> Finding:
+def _slices() -> Finding:
     courses = {
         "chord": ("chord [m]", CHORDS),
         "angle": ("angle below level [°]", np.radians(np.linspace(-89.0, 0.0, 45))),
@@ -150,7 +149,7 @@ def _slices(draw: Drawings) -> Finding:
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         if quantity != "angle":
             ax.set_xscale("log")
-        panels.append(draw.panel(figure, f"Over the {label.split(' [')[0]}."))
+        panels.append((figure, f"Over the {label.split(' [')[0]}."))
         worst[quantity] = {name: float(row.max()) for name, row in zip(NAMES[:-1], error, strict=False)}
     return finding(
         "length-error-slices",

@@ -6,25 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from sagline.article.drawing import Drawings, axes, cables_over_time, chapter, error_panels, finding
-from sagline.article.explanations import (
-    ANCHORS,
-    DEAD,
-    DENSITY,
-    LOAD,
-    MODULUS,
-    PARAMETERS,
-    PULLEY,
-    ZERO,
-    Explanation,
-    corrected_aic,
-)
+from sagline.article import explanations as causes
+from sagline.article.drawing import Drawing, axes, cables_over_time, chapter, error_panels, finding
 from sagline.article.regressions import fit_line
 from sagline.article.ten_poses import TenPoses, ten_poses, tour
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION
-from sagline.present.page import Chapter, Finding, Panel, Table, table_of
+from sagline.present.page import Chapter, Finding, Table, table_of
 
 AREA = 2e4  # area of a circle that shows an error, per meter of the error [pt^2/m]
 
@@ -32,16 +21,15 @@ AREA = 2e4  # area of a circle that shows an error, per meter of the error [pt^2
 def poses_chapter() -> Chapter:
     """Chapter about the ten poses of the prototype, and about possible causes of their errors."""
     study = ten_poses()
-    draw = Drawings("poses")
     return chapter(
         "poses",
         (
             _table(study),
             _single_causes(study),
-            _tour(draw),
-            _space(study, draw),
-            _trends(study, draw),
-            _best_explanations(study, draw),
+            _tour(),
+            _space(study),
+            _trends(study),
+            _best_explanations(study),
             _limits_of_ten_points(study),
         ),
     )
@@ -76,7 +64,7 @@ def _table(study: TenPoses) -> Finding:
     )
 
 
-def _tour(draw: Drawings) -> Finding:
+def _tour() -> Finding:
     plan, stops = tour()
     path, cables = plan.path, plan.state.cables
     assert path is not None
@@ -90,7 +78,7 @@ def _tour(draw: Drawings) -> Finding:
         ),
     ):
         figure = cables_over_time(path.time, values, label, 0.9, stops=stops.tolist())
-        panels.append(draw.panel(figure, caption))
+        panels.append((figure, caption))
     tension = cables.frame_end_tension
     return finding(
         "tour",
@@ -104,16 +92,16 @@ def _tour(draw: Drawings) -> Finding:
     )
 
 
-def _space(study: TenPoses, draw: Drawings) -> Finding:
+def _space(study: TenPoses) -> Finding:
     table = study.table
     caption = "The poses in the {}-z plane; areas show the positioning errors."
-    panels = error_panels(table.points, table.desired, [("", table.distance, AREA, BLUE)], caption, draw)
+    panels = error_panels(table.points, table.desired, [("", table.distance, AREA, BLUE)], caption)
     line, height = study.height_line, table.desired[:, 2]
     figure, ax = axes("$z$ desired [m]", "vertical error [mm]")
     ax.plot(height, 1e3 * table.error[:, 2], "o", color=BLUE, markersize=4.0, label="measured")
     ends = np.array([height.min(), height.max()])
     ax.plot(ends, 1e3 * (line.slope * ends + line.intercept), color="black", linewidth=0.9, label="line")
-    panels.append(draw.panel(figure, "Actual minus desired height of the platform."))
+    panels.append((figure, "Actual minus desired height of the platform."))
     tension = study.plan.horizontal_tension.mean(axis=1)
     against = float(np.corrcoef(tension, table.distance)[0, 1])
     return finding(
@@ -129,7 +117,7 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
     )
 
 
-def _trends(study: TenPoses, draw: Drawings) -> Finding:
+def _trends(study: TenPoses) -> Finding:
     height = study.table.desired[:, 2]
     pairs = [axes("$z$ desired [m]", "vertical error [mm]") for _ in range(2)]
     for _, ax in pairs:
@@ -137,7 +125,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     fine = np.array([height.min(), height.max()])
     slopes = {name: study.height_slope(error) for name, error in study.trends.items()}
     listed = []
-    for k, parameter in enumerate(PARAMETERS):
+    for k, parameter in enumerate(causes.PARAMETERS):
         ax, error = pairs[k // 5][1], study.trends[parameter.name]
         label = f"{parameter.name} {n(parameter.typical, '+g', parameter.unit)}"
         line = fit_line(height, 1e3 * error[:, 2])
@@ -157,7 +145,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     return finding(
         "one-parameter-off",
         numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": 1e3 * study.height_line.slope},
-        panels=[draw.panel(figure, caption) for (figure, _), caption in zip(pairs, captions, strict=True)],
+        panels=[(figure, caption) for (figure, _), caption in zip(pairs, captions, strict=True)],
         data=(
             Table(
                 "Predicted vertical error [mm] at the ten poses, and its slope over height [mm/m]",
@@ -165,7 +153,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
                 rows,
             ),
         ),
-        stiffer=slopes[MODULUS],
+        stiffer=slopes[causes.MODULUS],
         falling=", ".join(falling),
     )
 
@@ -184,13 +172,15 @@ AS_MEASURED = 0.15  # largest relative difference of a slope that counts as equa
 LOWEST, HIGHEST = "P8", "P7"
 
 
-def _best_explanations(study: TenPoses, draw: Drawings) -> Finding:
+def _best_explanations(study: TenPoses) -> Finding:
     """Finding about the best explanations of the measured errors by one, two and three parameters."""
     one, two, three = (study.best(count) for count in (1, 2, 3))
     second = study.explanations[1][1]
     alone = {found.parameters[0].name: found for found in study.explanations[0]}
-    beside = {name: study.explanation(ZERO, PULLEY, name) for name in (DEAD, MODULUS, LOAD)}
-    places = [(beside[name], beside[name].place(name)) for name in (MODULUS, LOAD)]
+    beside = {
+        name: study.explanation(causes.ZERO, causes.PULLEY, name) for name in (causes.DEAD, causes.MODULUS, causes.LOAD)
+    }
+    places = [(beside[name], beside[name].place(name)) for name in (causes.MODULUS, causes.LOAD)]
     ratios = [abs(found.values[k]) / found.deviation[k] for found, k in places]  # from zero error, in deviations
     far = float(np.ceil(10.0 * max(ratios))) / 10.0
     inside = min(found.aicc for found in study.explanations[2] if not found.at_limit.any())
@@ -205,7 +195,7 @@ def _best_explanations(study: TenPoses, draw: Drawings) -> Finding:
             "second_two_aicc_above_best_two": second.aicc - two.aicc,
             "modulus_and_load_within_deviations": far,
         },
-        panels=tuple(_panel(study, study.best(k + 1), name, draw) for k, name in enumerate(COUNTS)),
+        panels=tuple(_panel(study, study.best(k + 1), name) for k, name in enumerate(COUNTS)),
         data=(_table_of_explanations(study),),
         one=one,
         two=two,
@@ -214,11 +204,11 @@ def _best_explanations(study: TenPoses, draw: Drawings) -> Finding:
         one_values=_values(one),
         two_values=_values(two),
         three_values=_values(three),
-        dead_cable=_told(beside[DEAD], DEAD),
-        modulus=_told(beside[MODULUS], MODULUS),
-        load=_told(beside[LOAD], LOAD),
-        modulus_alone=alone[MODULUS],
-        density_alone=alone[DENSITY],
+        dead_cable=_told(beside[causes.DEAD], causes.DEAD),
+        modulus=_told(beside[causes.MODULUS], causes.MODULUS),
+        load=_told(beside[causes.LOAD], causes.LOAD),
+        modulus_alone=alone[causes.MODULUS],
+        density_alone=alone[causes.DENSITY],
         second_values=_values(second),
     )
 
@@ -226,7 +216,7 @@ def _best_explanations(study: TenPoses, draw: Drawings) -> Finding:
 def _limits_of_ten_points(study: TenPoses) -> Finding:
     """Finding about parameters that the measured errors of ten poses cannot separate or determine."""
     few = [found for found in study.explanations[1] if found.rms < FEW]
-    named = all(found.names & {PULLEY, ANCHORS} for found in few)
+    named = all(found.names & {causes.PULLEY, causes.ANCHORS} for found in few)
     zeros = 1e3 * study.single_zero
     return finding(
         "ten-points",
@@ -257,7 +247,7 @@ def _table_of_explanations(study: TenPoses) -> Table:
     shown = [group if k == 0 else group[:SHOWN] for k, group in enumerate(study.explanations)]
     rest = study.table.error - study.model_error
     rms, worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
-    found = [("nothing off", rms, worst, rms, corrected_aic(rms, rest.size, 0))]
+    found = [("nothing off", rms, worst, rms, causes.corrected_aic(rms, rest.size, 0))]
     found += [(_values(one), one.rms, one.worst, one.left_out, one.aicc) for group in shown for one in group]
     return Table(
         f"No parameter, one parameter, and the best {SHOWN} with two and with three; in parentheses: uncertainty",
@@ -269,17 +259,17 @@ def _table_of_explanations(study: TenPoses) -> Table:
     )
 
 
-def _panel(study: TenPoses, found: Explanation, count: str, draw: Drawings) -> Panel:
+def _panel(study: TenPoses, found: causes.Explanation, count: str) -> Drawing:
     figure, ax = axes("$z$ desired [m]", "error [mm]")
     height = study.table.desired[:, 2]
     for axis, name, color, marker in ((2, "z", VERMILLION, "o"), (1, "y", BLUE, "s")):
         ax.plot(height, 1e3 * study.table.error[:, axis], marker, color=color, markersize=4.5, label=f"{name} measured")
         look: dict[str, Any] = {"color": color, "markersize": 7.0, "markerfacecolor": "none"}
         ax.plot(height, 1e3 * found.predicted[:, axis], marker, **look, label=f"{name} explained")
-    return draw.panel(figure, f"Best explanation by {count}: {_values(found)}.")
+    return figure, f"Best explanation by {count}: {_values(found)}."
 
 
-def _numbers(found: Explanation) -> dict[str, Any]:
+def _numbers(found: causes.Explanation) -> dict[str, Any]:
     names = [parameter.name for parameter in found.parameters]
     return {
         "values": dict(zip(names, found.values, strict=True)),
@@ -292,11 +282,11 @@ def _numbers(found: Explanation) -> dict[str, Any]:
     }
 
 
-def _values(found: Explanation) -> str:
+def _values(found: causes.Explanation) -> str:
     return ", ".join(f"{parameter.name} {_told(found, parameter.name)}" for parameter in found.parameters)
 
 
-def _told(found: Explanation, name: str) -> str:
+def _told(found: causes.Explanation, name: str) -> str:
     """Text of the value of `name` with its standard uncertainty; a value at a limit has the mark "(limit)"."""
     k = found.place(name)
     value, unit = found.values[k], found.parameters[k].unit
@@ -332,15 +322,15 @@ def _single_causes(study: TenPoses) -> Finding:
         data=(_table_of_classes(study, alone, slopes),),
         fall=-measured,
         falling=_listed(falling),
-        pulley=alone[PULLEY],
-        anchors_name=ANCHORS,
-        anchors=alone[ANCHORS],
+        pulley=alone[causes.PULLEY],
+        anchors_name=causes.ANCHORS,
+        anchors=alone[causes.ANCHORS],
         names=names,
         no_cause=_listed(none),
     )
 
 
-def _table_of_classes(study: TenPoses, alone: dict[str, Explanation], slopes: dict[str, float]) -> Table:
+def _table_of_classes(study: TenPoses, alone: dict[str, causes.Explanation], slopes: dict[str, float]) -> Table:
     head = ["off", "for example", "mean displacement [mm]", "best value", "slope [mm/m]"]
     measured = (1e3 * study.height_line.slope, "+.1f"), (1e3 * study.measured_rms, ".1f")
     return Table(
@@ -351,7 +341,7 @@ def _table_of_classes(study: TenPoses, alone: dict[str, Explanation], slopes: di
     )
 
 
-def _row(study: TenPoses, found: Explanation, slope: float) -> tuple[str, ...]:
+def _row(study: TenPoses, found: causes.Explanation, slope: float) -> tuple[str, ...]:
     parameter, limit = found.parameters[0], " (limit)" if found.at_limit[0] else ""
     return (
         parameter.name,
@@ -364,7 +354,7 @@ def _row(study: TenPoses, found: Explanation, slope: float) -> tuple[str, ...]:
     )
 
 
-def _remark(study: TenPoses, found: Explanation, slope: float) -> str:
+def _remark(study: TenPoses, found: causes.Explanation, slope: float) -> str:
     measured = 1e3 * float(study.height_line.slope)
     if found.rms > NOTHING * study.measured_rms:
         return "explains nothing"

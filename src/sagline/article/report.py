@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from matplotlib.ticker import FixedLocator, NullLocator
 
 import sagline as sl
-from sagline.article.drawing import NAME_SIZE, Drawings, axes
+from sagline.article.drawing import NAME_SIZE, axes, panel_of
 from sagline.article.simulation import ERROR_BAND
 from sagline.core.numbers import n
 from sagline.files.writing import check_files, plain
@@ -167,6 +167,8 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yticks(range(len(models)), labels=list(models))
     ax.set_ylim(len(models) - 0.5, -0.5)
-    return Drawings("result").panel(
-        figure, "Position errors of exact cables along the article's path, with lengths that each cable model plans."
+    return panel_of(
+        "result",
+        figure,
+        "Position errors of exact cables along the article's path, with lengths that each cable model plans.",
     )

@@ -11,7 +11,7 @@ import numpy as np
 import sagline as sl
 from sagline.article.drawing import (
     WIDTH,
-    Drawings,
+    Drawing,
     axes,
     cables_over_time,
     chapter,
@@ -25,7 +25,7 @@ from sagline.core.numbers import n
 from sagline.plot.plan import path as draw_path
 from sagline.plot.robot import robot as draw_robot
 from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION, Sheet, draw_components
-from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
+from sagline.present.page import Chapter, Finding, Table, Verdict
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
 # Equation (55) of the article selects the tensions that are closest to the previous tensions. The figures of the
@@ -153,22 +153,21 @@ NEAR = 1.05  # a tension is near its minimum if it is less than this multiple of
 def simulation_chapter() -> Chapter:
     """Chapter about both robots along the path."""
     study = path_study()
-    draw = Drawings("simulation")
     return chapter(
         "simulation",
         (
-            _robots(study, draw),
-            _path(study.path, draw),
-            _courses(study, draw),
-            _error(study, draw),
+            _robots(study),
+            _path(study.path),
+            _courses(study),
+            _error(study),
             _comparison(study),
-            _models(study, draw),
-            _low_tension(draw),
+            _models(study),
+            _low_tension(),
         ),
     )
 
 
-def _robots(study: PathStudy, draw: Drawings) -> Finding:
+def _robots(study: PathStudy) -> Finding:
     panels = []
     for run, caption in zip(study.of(sl.Catenary), ("First configuration: suspended.", "Second: mixed."), strict=True):
         figure = Sheet(figsize=(WIDTH, 3.4))
@@ -176,11 +175,11 @@ def _robots(study: PathStudy, draw: Drawings) -> Finding:
         ax = figure.add_subplot(projection="3d")
         draw_robot(run.plan.state.one_robot, sl.Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
         ax.set_title("")
-        panels.append(draw.panel(figure, caption))
+        panels.append((figure, caption))
     return finding("robots", panels=panels)
 
 
-def _path(path: sl.Path, draw: Drawings) -> Finding:
+def _path(path: sl.Path) -> Finding:
     figure, ax = axes("", "")
     draw_path(path, ax)
     figure.subplots_adjust(bottom=0.16, top=0.92)
@@ -197,11 +196,11 @@ def _path(path: sl.Path, draw: Drawings) -> Finding:
             "speed_max": speed.max(),
             "acceleration_max": acceleration.max(),
         },
-        panels=(draw.panel(figure, "The path from above (figure 18)."), draw.panel(second, "Velocities (figure 19).")),
+        panels=((figure, "The path from above (figure 18)."), (second, "Velocities (figure 19).")),
     )
 
 
-def _courses(study: PathStudy, draw: Drawings) -> Finding:
+def _courses(study: PathStudy) -> Finding:
     panels, numbers, texts = [], {}, []
     for run, robot, figure in zip(study.of(sl.Empirical), ("suspended", "mixed"), (20, 21), strict=True):
         cables, numbers[robot] = run.plan.state.cables, figures(run)._asdict()
@@ -211,7 +210,7 @@ def _courses(study: PathStudy, draw: Drawings) -> Finding:
             (cables.horizontal_tension, "$T_x$ [N]", "T_x"),
             (cables.vertical_force, "$T_z$ [N]", "T_z"),
         ):
-            panels.append(_cables(run.plan, values, label, f"Figure {figure}, {robot}: {what}.", draw))
+            panels.append(_cables(run.plan, values, label, f"Figure {figure}, {robot}: {what}."))
         found = figures(run)
         texts.append(
             f"{robot.capitalize()}: L {n(found.length_min, '.2f')} to {n(found.length_max, '.2f', 'm')}, d "
@@ -223,19 +222,19 @@ def _courses(study: PathStudy, draw: Drawings) -> Finding:
     return finding("courses", numbers=numbers, panels=panels, courses=".\n\n".join(texts))
 
 
-def _cables(plan: sl.Plan, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
+def _cables(plan: sl.Plan, values: Array, label: str, caption: str) -> Drawing:
     path = plan.path
     assert path is not None
     figure = cables_over_time(path.time, values, label, 1.0, "{}")
     figure.axes[0].set_xlim(path.time[0], path.time[-1])
-    return draw.panel(figure, caption, "cable")
+    return figure, caption, "cable"
 
 
-def _error(study: PathStudy, draw: Drawings) -> Finding:
+def _error(study: PathStudy) -> Finding:
     panels, found = [], {}
     for run, robot in zip(study.of(sl.Empirical), ("suspended", "mixed"), strict=True):
         found[robot] = figures(run)
-        panels.append(_error_panel(run, study.path, f"{robot.capitalize()}: empirical model.", draw))
+        panels.append(_error_panel(run, study.path, f"{robot.capitalize()}: empirical model."))
     inside = all(f.axis_error_max <= ERROR_BAND for f in found.values())
     return finding(
         "position-error",
@@ -253,12 +252,12 @@ def _error(study: PathStudy, draw: Drawings) -> Finding:
     )
 
 
-def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str, draw: Drawings) -> Panel:
+def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str) -> Drawing:
     part = thinning(len(path))
     figure, ax = axes("time [s]", "position error [mm]", height=2.7)
     draw_components(ax, path.time[part], 1e3 * run.position_error[part])
     ax.set_xlim(path.time[0], path.time[-1])
-    return draw.panel(figure, caption)
+    return figure, caption
 
 
 def _comparison(study: PathStudy) -> Finding:
@@ -289,7 +288,7 @@ def _comparison(study: PathStudy) -> Finding:
     )
 
 
-def _models(study: PathStudy, draw: Drawings) -> Finding:
+def _models(study: PathStudy) -> Finding:
     rows, numbers = [], {}
     for model, first, second in zip(study.models, study.suspended, study.mixed, strict=True):
         pair, name = (figures(first), figures(second)), type(model).__name__
@@ -316,7 +315,7 @@ def _models(study: PathStudy, draw: Drawings) -> Finding:
             distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
-        panels.append(draw.panel(figure, f"Position errors of four models, {robot}; the exact model is the reference."))
+        panels.append((figure, f"Position errors of four models, {robot}; the exact model is the reference."))
     shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]
     return finding(
         "five-models",
@@ -338,7 +337,7 @@ def _models(study: PathStudy, draw: Drawings) -> Finding:
     )
 
 
-def _low_tension(draw: Drawings) -> Finding:
+def _low_tension() -> Finding:
     errors, bounds = low_tension_study(LIMITS)
     figure, ax = axes("lower limit of the chord tension [N]", "largest error along an axis [mm]")
     for error, color, label in zip(errors, (BLUE, VERMILLION), ("suspended", "mixed"), strict=True):
@@ -355,7 +354,7 @@ def _low_tension(draw: Drawings) -> Finding:
             "bound_54_mm": [1e3 * f.axis_error_max for f in bounds],
             "bound_54_lowest_N": [f.tension_min for f in bounds],
         },
-        panels=(draw.panel(figure, "Largest position error of the empirical model over the lower tension limit."),),
+        panels=((figure, "Largest position error of the empirical model over the lower tension limit."),),
         good_from=LIMITS[errors.max(axis=0) <= ERROR_BAND].min(),
     )
 

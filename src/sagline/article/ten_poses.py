@@ -10,21 +10,7 @@ from importlib.resources import files
 import numpy as np
 
 import sagline as sl
-from sagline.article.explanations import (
-    ANCHORS,
-    DEAD,
-    PARAMETERS,
-    PULLEY,
-    ZERO,
-    ErrorOf,
-    Errors,
-    Explanation,
-    explanations,
-    rest_positions,
-    robot_with_errors,
-    subsets,
-    tangents,
-)
+from sagline.article import explanations as causes
 from sagline.article.regressions import FittedLine, fit_line
 from sagline.core.arrays import Array, locked
 from sagline.motion.rest_to_rest import QUINTIC
@@ -81,7 +67,7 @@ class TenPoses:
     # name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3)
     trends: dict[str, Array]
     # all explanations by one parameter, by two and by three parameters; each list is sorted by the remaining error
-    explanations: tuple[tuple[Explanation, ...], ...]
+    explanations: tuple[tuple[causes.Explanation, ...], ...]
     # share of a pulley radius's effect that errors of length offset and anchor height together can reproduce (ratio of
     # vector norms)
     imitated: float
@@ -93,11 +79,11 @@ class TenPoses:
         """Slope [mm/m] of a line that is fitted to the vertical `error` (10, 3) [m] over the height of the poses."""
         return float(fit_line(self.table.desired[:, 2], 1e3 * error[:, 2]).slope)
 
-    def best(self, count: int) -> Explanation:
+    def best(self, count: int) -> causes.Explanation:
         """Explanation by `count` parameters that has the smallest remaining error."""
         return self.explanations[count - 1][0]
 
-    def explanation(self, *names: str) -> Explanation:
+    def explanation(self, *names: str) -> causes.Explanation:
         """Explanation by the parameters that are named `names`."""
         return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
 
@@ -109,11 +95,13 @@ def ten_poses(most: int = 3) -> TenPoses:
     table, robot = table2(), sl.load_robot("article-prototype")
     plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 
-    def error_of(errors: Sequence[Errors]) -> Array:
-        return rest_positions(robot, plan, home, errors) - table.desired
+    def error_of(errors: Sequence[causes.Errors]) -> Array:
+        return causes.rest_positions(robot, plan, home, errors) - table.desired
 
-    nominal, dead, *off = error_of([{}, {DEAD: 1.0}, *({one.name: one.typical} for one in PARAMETERS)])
-    found = sorted(explanations(error_of, table.error, subsets(PARAMETERS, most)), key=lambda one: one.rms)
+    nominal, dead, *off = error_of([{}, {causes.DEAD: 1.0}, *({one.name: one.typical} for one in causes.PARAMETERS)])
+    found = sorted(
+        causes.explanations(error_of, table.error, causes.subsets(causes.PARAMETERS, most)), key=lambda one: one.rms
+    )
     ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(most))
     imitated, single_zero = _limits(robot, error_of, plan, ranked[1][0])
     return TenPoses(
@@ -122,7 +110,7 @@ def ten_poses(most: int = 3) -> TenPoses:
         home=home,
         model_error=nominal,
         height_line=fit_line(table.desired[:, 2], table.error[:, 2]),
-        trends={parameter.name: error for parameter, error in zip(PARAMETERS, off, strict=True)},
+        trends={parameter.name: error for parameter, error in zip(causes.PARAMETERS, off, strict=True)},
         explanations=ranked,
         imitated=imitated,
         single_zero=single_zero,
@@ -144,15 +132,15 @@ def _planned(robot: sl.Robot, positions: Array) -> sl.Plan:
     return sl.inverse(robot, sl.Pose.from_euler(positions, 0.0, 0.0, 0.0), sl.Empirical(), METHOD)
 
 
-def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> tuple[float, Array]:
+def _limits(robot: sl.Robot, error_of: causes.ErrorOf, plan: sl.Plan, found: causes.Explanation) -> tuple[float, Array]:
     """Values of `imitated` and `single_zero`, computed near the best explanation by two parameters."""
     at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
-    three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
-    ((_, slopes),) = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])
-    is_pulley = np.array([p.name == PULLEY for p in three])
+    three = tuple(p for p in causes.PARAMETERS if p.name in (causes.PULLEY, causes.ZERO, causes.ANCHORS))
+    ((_, slopes),) = causes.tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])
+    is_pulley = np.array([p.name == causes.PULLEY for p in three])
     whole, others = slopes[:, is_pulley], slopes[:, ~is_pulley]
     imitation = others @ np.linalg.lstsq(others, whole)[0]
-    state = sl.inverse(robot_with_errors(robot, at), plan.state.pose, tension=METHOD).state
+    state = sl.inverse(causes.robot_with_errors(robot, at), plan.state.pose, tension=METHOD).state
     by_zero = sl.stiffness(state).length_sensitivity[:, :3].reshape(-1, robot.cable_count)
     scatter = found.rms * np.sqrt(len(by_zero) / (len(by_zero) - robot.cable_count))
     imitated = float(np.linalg.norm(imitation) / np.linalg.norm(whole))

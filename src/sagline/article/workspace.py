@@ -7,12 +7,12 @@ from typing import TypeAlias
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, chapter, finding
+from sagline.article.drawing import Drawing, axes, chapter, finding
 from sagline.article.simulation import ROBOTS
 from sagline.core.numbers import n
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Chapter, Finding, Panel, table_of
+from sagline.present.page import Chapter, Finding, table_of
 from sagline.workspaces.levels import Plane, slice_of
 
 CELLS = 24  # number of cells of the grid along the longest edge of the frame
@@ -26,8 +26,7 @@ Pair: TypeAlias = tuple[sl.Workspace, sl.Workspace]  # workspaces with exact cat
 def workspace_chapter() -> Chapter:
     """Chapter about the volumes and boundaries of the workspaces of both simulated robots."""
     pairs = {name: _pair(name) for name in ROBOTS}
-    draw = Drawings("workspace")
-    return chapter("workspace", (_volumes(pairs), _boundaries(pairs, draw)))
+    return chapter("workspace", (_volumes(pairs), _boundaries(pairs)))
 
 
 def _pair(name: str) -> Pair:
@@ -69,10 +68,10 @@ def _volumes(pairs: dict[str, Pair]) -> Finding:
     )
 
 
-def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
+def _boundaries(pairs: dict[str, Pair]) -> Finding:
     apart = {name: _farthest(pair) for name, pair in pairs.items()}
     panels = tuple(
-        _panel(pair, normal, at, draw)
+        _panel(pair, normal, at)
         for pair in pairs.values()
         for normal, at in ((2, HEIGHT), (1, 0.0))
     )  # fmt: skip
@@ -82,7 +81,7 @@ def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
     )
 
 
-def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
+def _panel(pair: Pair, normal: int, at: float) -> Drawing:
     """Drawing of the boundaries of both workspaces of `pair` in the plane `normal` = `at` [m]."""
     exact, straight = pair
     plane, box = Plane(normal, at), exact.box
@@ -94,7 +93,7 @@ def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
         ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors=color, linestyles=style, linewidths=1.3)
         ax.plot([], [], color=color, linestyle=style, label=label)
     ax.set(xlim=(box.low[first], box.high[first]), ylim=(box.low[second], box.high[second]))
-    return draw.panel(figure, f"{exact.robot.name}: boundaries in the plane {plane}; the frame is the border.")
+    return figure, f"{exact.robot.name}: boundaries in the plane {plane}; the frame is the border."
 
 
 def _farthest(pair: Pair) -> float:

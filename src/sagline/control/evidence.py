@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from enum import IntEnum
-from typing import ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -248,6 +248,12 @@ class Fault(ABC):
     homing: ClassVar[bool] = False
     lasting: ClassVar[bool] = False
     quiet: ClassVar[float] = 0.0
+
+    def __init_subclass__(cls, **declared: Any) -> None:
+        """Declare a rule: the attributes of the class that the class statement gives."""
+        super().__init_subclass__()
+        for name, value in declared.items():
+            setattr(cls, name, value)
 
     def __init__(self, seen: Evidence) -> None:
         """Begin without findings.

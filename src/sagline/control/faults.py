@@ -45,36 +45,26 @@ class _Old(Fault):
         return f"group {group}: {what}. {self.step}"
 
 
-class _GroupStale(_Old):
+class _GroupStale(_Old, name="group stale", reaction=Reaction.DEGRADED, within="30 ms", quiet=1.0):
     """Group that answers late. The tension loop is off until the group answers again."""
 
-    name = "group stale"
     rule = f"the newest sample of a group is {STALE} cycles old, as blocks are missing, repeated, late or invalid"
-    reaction = Reaction.DEGRADED
-    within = "30 ms"
-    quiet = 1.0
     cycles = STALE
     step = "The tension loop is off until the group answers."
 
 
-class _GroupSilent(_Old):
+class _GroupSilent(_Old, name="group silent", reaction=Reaction.STOPPING, within="100 ms"):
     """Group that does not answer."""
 
-    name = "group silent"
     rule = f"the newest sample of a group is {SILENT} cycles old"
-    reaction = Reaction.STOPPING
-    within = "100 ms"
     cycles = SILENT
     step = f"{CHECK}, then acknowledge."
 
 
-class _BlockDiscarded(Fault):
+class _BlockDiscarded(Fault, name="block discarded", reaction=Reaction.EVENT, within="1 cycle"):
     """Group that sends invalid blocks. A group without valid blocks counts first as late and then as silent."""
 
-    name = "block discarded"
     rule = "incomplete or foreign (by its counters, magic, version or size), repeated, or older than an earlier block"
-    reaction = Reaction.EVENT
-    within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -93,13 +83,10 @@ class _BlockDiscarded(Fault):
         return self._line if self._quiet < WINDOW else None
 
 
-class _OwnerLost(Fault):
+class _OwnerLost(Fault, name="owner lost", reaction=Reaction.STOPPING, within="1 cycle"):
     """Group that the controller no longer owns."""
 
-    name = "owner lost"
     rule = "the owner of a group changes after the controller owned all groups"
-    reaction = Reaction.STOPPING
-    within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
         command = cycle.command
@@ -113,14 +100,10 @@ class _OwnerLost(Fault):
         return f"group {group}: {who}; expected: {command.owner}. Stop the other controller, then connect again."
 
 
-class _GroupActs(Fault):
+class _GroupActs(Fault, name="group acts by itself", reaction=Reaction.STOPPING, within="1 cycle", lasting=True):
     """Group that has stopped because of its PLC or one of its drives."""
 
-    name = "group acts by itself"
     rule = "a PLC reports a fault or locked drums, or a drive reports a fault"
-    reaction = Reaction.STOPPING
-    within = "1 cycle"
-    lasting = True
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -153,14 +136,12 @@ class _GroupActs(Fault):
         return ", and ".join(filter(None, (fault_text(code) if code else "", "drums are locked" if locked else "")))
 
 
-class _EmergencyStop(Fault):
+class _EmergencyStop(
+    Fault, name="emergency stop", reaction=Reaction.EMERGENCY, within="a scan of the PLC, 1 cycle", homing=True
+):
     """Emergency stop of the hardware, reported by the PLC."""
 
-    name = "emergency stop"
     rule = "a PLC reports that the emergency stop is pressed"
-    reaction = Reaction.EMERGENCY
-    within = "a scan of the PLC, 1 cycle"
-    homing = True
 
     def found(self, cycle: Cycle) -> str | None:
         if not (self.seen.faulted or self.seen.bits & _EMERGENCY):
@@ -173,13 +154,10 @@ class _EmergencyStop(Fault):
         return f"emergency stop, reported by group {groups}. Make the machine safe, release it, then connect and home."
 
 
-class _CycleLate(Fault):
+class _CycleLate(Fault, name="cycle late", reaction=Reaction.EVENT, within="1 cycle"):
     """Cycles that are late because the computer is too busy."""
 
-    name = "cycle late"
     rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles > {1e3 * LATE_OFTEN:g} ms late"
-    reaction = Reaction.EVENT
-    within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -206,13 +184,10 @@ class _CycleLate(Fault):
         )
 
 
-class _CycleLost(Fault):
+class _CycleLost(Fault, name="cycle lost", reaction=Reaction.STOPPING, within="1 cycle"):
     """Cycle that began so late that the PLCs have stopped the winches."""
 
-    name = "cycle lost"
     rule = f"> {1e3 * LOST:g} ms late"
-    reaction = Reaction.STOPPING
-    within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
         if cycle.late <= LOST:
@@ -223,13 +198,10 @@ class _CycleLost(Fault):
         )
 
 
-class _RecordingStopped(Fault):
+class _RecordingStopped(Fault, name="recording stopped", reaction=Reaction.EVENT, within="1 s"):
     """Recording that has stopped; the motion continues."""
 
-    name = "recording stopped"
     rule = "a write fails, for instance because the disk is full, or the queue to the writer is full"
-    reaction = Reaction.EVENT
-    within = "1 s"
 
     def found(self, cycle: Cycle) -> str | None:
         if not cycle.recording:

@@ -17,13 +17,10 @@ NEAR_SAMPLES, SLACK_SAMPLES = 5, 3
 SUDDEN: Final = 0.5  # least tension of a cable one sample before it breaks, as a share of the planned tension
 
 
-class _OverTension(Fault):
+class _OverTension(Fault, name="over-tension", reaction=Reaction.STOPPING, within="10 to 50 ms"):
     """Cable whose tension is too large."""
 
-    name = "over-tension"
     rule = f"T_A above its upper limit in one sample, or above {NEAR:g} of this limit in {NEAR_SAMPLES} samples"
-    reaction = Reaction.STOPPING
-    within = "10 to 50 ms"
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -48,18 +45,13 @@ class _OverTension(Fault):
         )
 
 
-class _CableBroken(Fault):
+class _CableBroken(Fault, name="cable broken", reaction=Reaction.EMERGENCY, within="30 ms", homing=True, lasting=True):
     """Broken cable. The tensions of the other cables change at the same time."""
 
-    name = "cable broken"
     rule = (
         f"slack in one sample, with more than {SUDDEN:g} of its planned tension one sample before; the deviations of "
         f"the other cables from the plan change by > {SIGMAS:g} sigma of their noise"
     )
-    reaction = Reaction.EMERGENCY
-    within = "30 ms"
-    homing = True
-    lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
         seen = self.seen
@@ -82,17 +74,14 @@ class _CableBroken(Fault):
         )
 
 
-class _Slack(Fault):
+class _Slack(Fault, name="slack", reaction=Reaction.STOPPING, within="30 ms"):
     """Cable that is slack, although the plan requires it to be taut."""
 
-    name = "slack"
     rule = (
         f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma if the limit is 0) in {SLACK_SAMPLES} samples; "
         f"the planned tension is at least {PLANNED_SHARE:g} of the limit, and the motor does not pull (2 x {SIGMAS:g} "
         "sigma if the limit is a chord tension, because this differs from T_A)"
     )
-    reaction = Reaction.STOPPING
-    within = "30 ms"
 
     def found(self, cycle: Cycle) -> str | None:
         seen = self.seen
@@ -114,14 +103,10 @@ DISPROVED: Final = 0.5  # a full-scale reading is wrong if the motor holds less 
 _STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform is at rest, then acknowledge."
 
 
-class _CellLost(Fault):
+class _CellLost(Fault, name="cell lost", reaction=Reaction.STOPPING, within="1 sample", lasting=True):
     """Load cell without a reading during a motion, so that the tension of its cable is not monitored."""
 
-    name = "cell lost"
     rule = "a reading that is not a number, in a motion; the PLC then does not wind in this cable"
-    reaction = Reaction.STOPPING
-    within = "1 sample"
-    lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
         seen = self.seen
@@ -139,17 +124,13 @@ class _CellLost(Fault):
         )
 
 
-class _CellDead(Fault):
+class _CellDead(Fault, name="cell zero or saturated", reaction=Reaction.DEGRADED, within="30 ms", lasting=True):
     """Load cell with an impossible reading."""
 
-    name = "cell zero or saturated"
     rule = (
         f"no reading at rest, a reading below -{SIGMAS:g} sigma, at full scale while the motor holds less than "
         f"{DISPROVED:g} of it, or slack in {SLACK_SAMPLES} samples while the motor pulls"
     )
-    reaction = Reaction.DEGRADED
-    within = "30 ms"
-    lasting = True
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -174,14 +155,10 @@ class _CellDead(Fault):
         return f"cell {cell} {reads}{holds}{planned}. {_STEP}"
 
 
-class _CellStuck(Fault):
+class _CellStuck(Fault, name="cell stuck", reaction=Reaction.DEGRADED, within="0.5 s", lasting=True):
     """Load cell with a constant reading."""
 
-    name = "cell stuck"
     rule = f"the same reading in {STUCK_SAMPLES} samples in motion"
-    reaction = Reaction.DEGRADED
-    within = "0.5 s"
-    lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
         seen = self.seen
@@ -204,14 +181,10 @@ class _CellStuck(Fault):
         return f"cell {cell} has read {reading:.4g} N in {STUCK_SAMPLES} samples of a motion. {_STEP}"
 
 
-class _CellOff(Fault):
+class _CellOff(Fault, name="cell wrong", reaction=Reaction.DEGRADED, within="0.5 s", lasting=True):
     """Load cell that contradicts the force balance of the platform."""
 
-    name = "cell wrong"
     rule = f"for {ODD_TIME:g} s the largest parity of the cells is > {SIGMAS:g} sigma, independent of the load"
-    reaction = Reaction.DEGRADED
-    within = "0.5 s"
-    lasting = True
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)

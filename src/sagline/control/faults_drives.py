@@ -25,18 +25,14 @@ REMEMBERED: Final = 32  # number of stored commands; fewer commands than this ar
 LONGEST: Final = 1.0  # longest time between two samples of a PLC [s]; a longer time means that its clock was reset
 
 
-class _EncoderJump(Fault):
+class _EncoderJump(Fault, name="encoder jump", reaction=Reaction.STOPPING, within="10 ms", homing=True):
     """Encoder whose length contradicts its rate."""
 
-    name = "encoder jump"
     rule = (
         f"|change of length - rate x time| > {1e3 * JUMP:g} mm per cycle between two samples, both with the rate "
         "in the first sample and with the rate of the set points; only for drives with power, not at a limit, and with "
         f"commands in time for the last {CATCHING_UP} cycles; also a length that is not a number"
     )
-    reaction = Reaction.STOPPING
-    within = "10 ms"
-    homing = True
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -85,14 +81,10 @@ class _EncoderJump(Fault):
         )
 
 
-class _FollowingError(Fault):
+class _FollowingError(Fault, name="following error", reaction=Reaction.STOPPING, within="10 ms", homing=True):
     """Drum that is too far from its set point."""
 
-    name = "following error"
     rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, for set points that the PLC has accepted"
-    reaction = Reaction.STOPPING
-    within = "10 ms"
-    homing = True
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -135,16 +127,13 @@ class _FollowingError(Fault):
         return away
 
 
-class _NotFollowing(Fault):
+class _NotFollowing(Fault, name="group does not follow", reaction=Reaction.STOPPING, within="40 or 100 ms"):
     """Group that accepts no commands, or accepts them but does not follow."""
 
-    name = "group does not follow"
     rule = (
         f"a group has accepted none of the last {BEHIND} follow commands, or {IDLE + 1} consecutive samples do not "
         "report that the group follows them"
     )
-    reaction = Reaction.STOPPING
-    within = "40 or 100 ms"
 
     def __init__(self, seen: Evidence) -> None:
         super().__init__(seen)
@@ -189,13 +178,10 @@ class _NotFollowing(Fault):
         return self._idle.get(group, 0)
 
 
-class _ServoSaturated(Fault):
+class _ServoSaturated(Fault, name="servo at its limit", reaction=Reaction.STOPPING, within="0.2 s"):
     """Drive at its force limit."""
 
-    name = "servo at its limit"
     rule = f"a drive's force at its limit for {SATURATED:g} s"
-    reaction = Reaction.STOPPING
-    within = "0.2 s"
 
     def found(self, cycle: Cycle) -> str | None:
         if _AT_LIMIT not in self.seen.states:
@@ -212,14 +198,12 @@ class _ServoSaturated(Fault):
         )
 
 
-class _CorrectionAtLimit(Fault):
+class _CorrectionAtLimit(
+    Fault, name="correction at its limit", reaction=Reaction.STOPPING, within="1 cycle", homing=True
+):
     """Length that the tension loop has corrected by more than the error of any good encoder."""
 
-    name = "correction at its limit"
     rule = "the tension loop has changed a length by the allowed maximum, 5 mm by default"
-    reaction = Reaction.STOPPING
-    within = "1 cycle"
-    homing = True
 
     def found(self, cycle: Cycle) -> str | None:
         if largest(cycle.correction) < self.seen.largest * (1.0 - 1e-9):

@@ -61,11 +61,6 @@ class Block:
         return tuple(rows)
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of the rows."""
-        return tuple(name for name, _, _ in self.rows)
-
-    @cached_property
     def packer(self) -> struct.Struct:
         """Packer of the block from `struct`, with every row at its offset."""
         text, at = ">", 0
@@ -79,14 +74,14 @@ class Block:
         known = {"magic": self.magic, "version": LAYOUT, AGAIN: values.get("counter", 0), **values}
         for name, column in (winches or {}).items():
             known |= {_winch_row(i, name): value for i, value in enumerate(column)}
-        return self.packer.pack(*[known.get(name, 0) for name in self.names])
+        return self.packer.pack(*[known.get(name, 0) for name, _, _ in self.rows])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
         """Unpack the values of the rows, by name. If the bytes are not this block, the result is the reason."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
-        values = dict(zip(self.names, self.packer.unpack(data), strict=True))
+        values = {name: value for (name, _, _), value in zip(self.rows, self.packer.unpack(data), strict=True)}
         if values["magic"] != self.magic:
             begins = f"16#{values['magic']:08X} instead of 16#{self.magic:08X}"
             return Refusal(f"{block} is of another program: it begins with {begins}", f"Check the address. {LOAD}")
@@ -117,82 +112,55 @@ AGAIN: Final = "counter_again"
 TORN: Final = "If this continues, the PLC writes the block in more than one scan"
 LOAD: Final = "Load the blocks of this version into the PLC: sagline export-scl ROBOT --out plc.scl"
 
-FROM_PLC: Final = Block(
-    number=101,
-    name="sagline_from_plc",
-    magic=int.from_bytes(b"SAGF"),
-    register=0,
-    size=104,
-    fields=(
-        Field("counter", "UDInt", 0, "counter of this block, incremented in each scan, 1 to 2147483647"),
-        Field("magic", "DWord", 4, "SAGF"),
-        Field("version", "UInt", 8, "version of this layout"),
-        Field("group", "UInt", 10, "number of the group of this PLC plus 1, 0 if not set"),
-        Field("time", "LReal", 12, "clock of the PLC [us]"),
-        Field("owner", "UDInt", 20, "id of the controller that owns this group, 0 for none"),
-        Field("echo", "UDInt", 24, "counter of the last accepted command"),
-        Field("status", "DWord", 28, "bits: ready, braked, following, ramping, holding, locked, emergency"),
-        Field("fault", "UInt", 32, "reason why the PLC has stopped its winches"),
-        Field("winches", "UInt", 34, "number of winches of this PLC"),
-        Field(
-            "winch",
-            (
-                Field("length", "LReal", 0, "unstrained length off the drum [m]"),
-                Field("rate", "Real", 8, "rate of the length [m/s]"),
-                Field("torque", "Real", 12, "torque at the motor's shaft, positive if it pays out cable [N m]"),
-                Field("tension", "Real", 16, "tension from the load cell [N]"),
-                Field("filtered", "Real", 20, "filtered tension from the load cell [N]"),
-                Field("counts", "DInt", 24, "counts of the encoder"),
-                Field("state", "UInt", 28, "state: braked, enabled, saturated, locked, fault"),
-                Field("fault", "UInt", 30, "fault code of the drive, 0 for none"),
-            ),
-            36,
-            "first and second winch of the group",
-        ),
-        Field(AGAIN, "UDInt", 100, "the same as counter, or the block is incomplete"),
-    ),
+_MEASURED: Final = (  # values of a winch in the block of a PLC
+    Field("length", "LReal", 0, "unstrained length off the drum [m]"),
+    Field("rate", "Real", 8, "rate of the length [m/s]"),
+    Field("torque", "Real", 12, "torque at the motor's shaft, positive if it pays out cable [N m]"),
+    Field("tension", "Real", 16, "tension from the load cell [N]"),
+    Field("filtered", "Real", 20, "filtered tension from the load cell [N]"),
+    Field("counts", "DInt", 24, "counts of the encoder"),
+    Field("state", "UInt", 28, "state: braked, enabled, saturated, locked, fault"),
+    Field("fault", "UInt", 30, "fault code of the drive, 0 for none"),
 )
-
-TO_PLC: Final = Block(
-    number=102,
-    name="sagline_to_plc",
-    magic=int.from_bytes(b"SAGT"),
-    register=100,
-    size=64,
-    fields=(
-        Field("counter", "UDInt", 0, "counter of commands, incremented in each cycle, 1 to 2147483647"),
-        Field("magic", "DWord", 4, "SAGT"),
-        Field("version", "UInt", 8, "version of this layout"),
-        Field("mode", "UInt", 10, "mode: 0 leave, 1 hold, 2 follow, 3 lock"),
-        Field("owner", "UDInt", 12, "id of the controller"),
-        Field("valid_for", "Time", 16, "time for which the PLC may use the command [ms]"),
-        Field(
-            "winch",
-            (
-                Field("length", "LReal", 0, "set point of the unstrained length off the drum [m]"),
-                Field("rate", "Real", 8, "rate of the set point [m/s]"),
-                Field("tension", "Real", 12, "expected tension at the drum [N]"),
-                Field("enable", "DWord", 16, "1: the drive may move"),
-            ),
-            20,
-            "first and second winch of the group",
-        ),
-        Field(AGAIN, "UDInt", 60, "the same as counter, or the block is incomplete"),
-    ),
+_COMMANDED: Final = (  # values of a winch in the block of a command
+    Field("length", "LReal", 0, "set point of the unstrained length off the drum [m]"),
+    Field("rate", "Real", 8, "rate of the set point [m/s]"),
+    Field("tension", "Real", 12, "expected tension at the drum [N]"),
+    Field("enable", "DWord", 16, "1: the drive may move"),
 )
-
-CLAIM: Final = Block(
-    number=103,
-    name="sagline_claim",
-    magic=int.from_bytes(b"SAGC"),
-    register=200,
-    size=8,
-    fields=(
-        Field("magic", "DWord", 0, "SAGC"),
-        Field("owner", "UDInt", 4, "id of the controller that claims the group; the PLC resets it to 0"),
-    ),
+_WINCHES: Final = "first and second winch of the group"
+_COMPLETE: Final = "the same as counter, or the block is incomplete"
+_FROM_PLC: Final = (
+    Field("counter", "UDInt", 0, "counter of this block, incremented in each scan, 1 to 2147483647"),
+    Field("magic", "DWord", 4, "SAGF"),
+    Field("version", "UInt", 8, "version of this layout"),
+    Field("group", "UInt", 10, "number of the group of this PLC plus 1, 0 if not set"),
+    Field("time", "LReal", 12, "clock of the PLC [us]"),
+    Field("owner", "UDInt", 20, "id of the controller that owns this group, 0 for none"),
+    Field("echo", "UDInt", 24, "counter of the last accepted command"),
+    Field("status", "DWord", 28, "bits: ready, braked, following, ramping, holding, locked, emergency"),
+    Field("fault", "UInt", 32, "reason why the PLC has stopped its winches"),
+    Field("winches", "UInt", 34, "number of winches of this PLC"),
+    Field("winch", _MEASURED, 36, _WINCHES),
+    Field(AGAIN, "UDInt", 100, _COMPLETE),
 )
-
+_TO_PLC: Final = (
+    Field("counter", "UDInt", 0, "counter of commands, incremented in each cycle, 1 to 2147483647"),
+    Field("magic", "DWord", 4, "SAGT"),
+    Field("version", "UInt", 8, "version of this layout"),
+    Field("mode", "UInt", 10, "mode: 0 leave, 1 hold, 2 follow, 3 lock"),
+    Field("owner", "UDInt", 12, "id of the controller"),
+    Field("valid_for", "Time", 16, "time for which the PLC may use the command [ms]"),
+    Field("winch", _COMMANDED, 20, _WINCHES),
+    Field(AGAIN, "UDInt", 60, _COMPLETE),
+)
+_CLAIM: Final = (
+    Field("magic", "DWord", 0, "SAGC"),
+    Field("owner", "UDInt", 4, "id of the controller that claims the group; the PLC resets it to 0"),
+)
+FROM_PLC: Final = Block(101, "sagline_from_plc", int.from_bytes(b"SAGF"), register=0, size=104, fields=_FROM_PLC)
+TO_PLC: Final = Block(102, "sagline_to_plc", int.from_bytes(b"SAGT"), register=100, size=64, fields=_TO_PLC)
+CLAIM: Final = Block(103, "sagline_claim", int.from_bytes(b"SAGC"), register=200, size=8, fields=_CLAIM)
 BLOCKS: Final = (FROM_PLC, TO_PLC, CLAIM)
 
 

@@ -14,7 +14,7 @@ from sagline.core.arguments import whole_number
 from sagline.core.errors import needed_packages
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import LOAD, Block
-from sagline.plc.wire import ANSWER, WireError, addresses_of, refusal_of
+from sagline.plc.wire import ANSWER, WireError, addresses_of, refusal_of, wire_errors
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -76,32 +76,23 @@ class _ModbusWire:
         self._device = device
 
     def open(self) -> None:
-        try:
-            connected = self._client.connect()  # type: ignore[no-untyped-call]
-        except Exception as error:
-            raise WireError(refusal_of(error, "Modbus")) from error
-        if not connected:
-            try:  # the library does not report the reason of the failure
-                socket.create_connection(self._place, timeout=ANSWER).close()
-            except OSError as error:
-                raise WireError(refusal_of(error, "Modbus")) from error
+        with wire_errors(_refusal):
+            if self._client.connect():  # type: ignore[no-untyped-call]
+                return
+            socket.create_connection(self._place, timeout=ANSWER).close()  # the library reports no reason of a failure
             raise WireError(Refusal("the connection was closed", "Check that no other client is connected to it"))
 
     def read(self, block: Block) -> bytes:
         count = block.size // 2
-        try:
+        with wire_errors(_refusal):
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
             registers = _good(answer, block).registers
             return struct.pack(f">{len(registers)}H", *registers)
-        except Exception as error:  # the library may raise any exception for an unknown answer
-            raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
         registers = list(struct.unpack(f">{len(data) // 2}H", data))
-        try:
+        with wire_errors(_refusal):
             _good(self._client.write_registers(block.register, registers, device_id=self._device), block)
-        except Exception as error:
-            raise _failed(error) from error
 
     def close(self) -> None:
         with suppress(Exception):  # errors have no effect any longer
@@ -117,8 +108,8 @@ class _ModbusWire:
         return self._client.connected
 
 
-def _failed(error: Exception) -> WireError:
-    return error if isinstance(error, WireError) else WireError(refusal_of(error, "Modbus"))
+def _refusal(error: Exception) -> Refusal:
+    return refusal_of(error, "Modbus")
 
 
 def _good(answer: ModbusPDU, block: Block) -> ModbusPDU:

@@ -12,7 +12,7 @@ from sagline.control.link import Refusal
 from sagline.core.errors import needed_packages
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import LOAD, Block
-from sagline.plc.wire import ANSWER, WireError, addresses_of, refusal_of
+from sagline.plc.wire import ANSWER, WireError, addresses_of, refusal_of, wire_errors
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -78,25 +78,19 @@ class _S7Wire:
         self._client: Client | None = None
 
     def open(self) -> None:
-        try:
+        with wire_errors(lambda error: refusal_of(error, "S7")):
             self._client = client = self._library.Client()
             client.set_param(self._library.type.Parameter.PDURequest, PDU)
             client.connect(self._host, RACK, SLOT, tcp_port=self._port)  # waits up to 5 s
             _socket(client).settimeout(ANSWER)
-        except Exception as error:  # the library may raise any exception for an unknown answer
-            raise WireError(refusal_of(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
-        try:
+        with wire_errors(lambda error: _no_access(error, block)):
             return bytes(self._open.db_read(block.number, 0, block.size))
-        except Exception as error:
-            raise WireError(_no_access(error, block)) from error
 
     def write(self, block: Block, data: bytes) -> None:
-        try:
+        with wire_errors(lambda error: _no_access(error, block)):
             self._open.db_write(block.number, 0, bytearray(data))
-        except Exception as error:
-            raise WireError(_no_access(error, block)) from error
 
     def close(self) -> None:
         client, self._client = self._client, None
@@ -144,8 +138,6 @@ def _socket(client: Client) -> socket.socket:
 
 
 def _no_access(error: Exception, block: Block) -> Refusal:
-    if isinstance(error, WireError):
-        return error.refusal
     text = str(error)
     if "(0x0a)" in text or "(0x05)" in text:
         return Refusal(f"it has no DB{block.number} of {block.size} bytes", f"{LOAD}, without optimized access")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from ipaddress import IPv6Address
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -131,6 +132,17 @@ class WireError(Exception):
         self.refusal = refusal  # reason and next step
 
 
+@contextmanager
+def wire_errors(refusal: Callable[[Exception], Refusal]) -> Iterator[None]:
+    """Convert all errors of a library, which may raise any exception for an unknown answer, to `WireError`."""
+    try:
+        yield
+    except WireError:
+        raise
+    except Exception as error:
+        raise WireError(refusal(error)) from error
+
+
 class Wire(Protocol):
     """Connection to one PLC. Its methods raise `WireError`. Other threads may call only `abort` and `reached`."""
 
@@ -153,10 +165,10 @@ class Wire(Protocol):
         """True if the connection is open."""
 
 
-def refusal_of(error: BaseException | None, protocol: str) -> Refusal:
+def refusal_of(error: BaseException, protocol: str) -> Refusal:
     """Reason why a connection failed."""
     text = " ".join(str(error).split()) or type(error).__name__
-    cause = error
+    cause: BaseException | None = error
     while cause is not None and not isinstance(cause, OSError):
         cause = cause.__cause__ or cause.__context__
     if isinstance(cause, ConnectionRefusedError):
