@@ -15,7 +15,7 @@ import numpy as np
 import sagline as sl
 from sagline import SaglineError
 from sagline.core.errors import printable
-from sagline.files.pose_text import pose_of_text
+from sagline.files.quantity import pose_of_text
 from sagline.files.table import load_readings
 from tests.effort import least_seconds
 

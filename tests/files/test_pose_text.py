@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline import InvalidValueError
-from sagline.files.pose_text import pose_of_text
+from sagline.files.quantity import pose_of_text
 from tests.refusal import refused
 
 

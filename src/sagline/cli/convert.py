@@ -66,7 +66,7 @@ def convert(
         sagline convert cogiro --kind javascript --out cogiro.json
     """
     from sagline.core.arrays import FARTHEST
-    from sagline.files.pose_text import decimal_numbers
+    from sagline.files.quantity import decimal_numbers
 
     out = out if out is None else file_of(out, f"{Path(source).stem}{ENDINGS[form][0]}")
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():

@@ -20,7 +20,7 @@ from sagline.cli.values import quantity
 from sagline.control.real_time import interrupt_calls
 from sagline.core.arrays import Array
 from sagline.core.errors import did_you_mean
-from sagline.files.pose_text import pose_of_text
+from sagline.files.quantity import pose_of_text
 
 EVERY: Final = 0.2  # time between two updates of the status line [s]
 PROMPT: Final = "> "

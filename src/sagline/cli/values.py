@@ -10,9 +10,8 @@ import numpy as np
 
 import sagline as sl
 from sagline.core.arrays import FARTHEST, checked
-from sagline.files.pose_text import pose_of_text as pose_of_text
-from sagline.files.pose_text import wrench_of_text
-from sagline.files.quantity import in_si
+from sagline.files.quantity import in_si, wrench_of_text
+from sagline.files.quantity import pose_of_text as pose_of_text
 
 MOST_POSES = 1_000_000  # largest number of poses on a grid
 HEAVIEST = 1e12  # [kg], larger than on any machine, and far below the overflow of numbers

@@ -20,11 +20,10 @@ from sagline.core.fields import units
 from sagline.files import table as tables
 from sagline.files.log_columns import ARRAYS, ColumnEntry, log_text
 from sagline.files.path_file import EULER, QUATERNION
-from sagline.files.pose_text import PoseEntry
 from sagline.files.reading import read_text, value_errors
 from sagline.files.table import CsvTable, line_error
 from sagline.files.writing import write_text
-from sagline.files.yaml_text import YAML_LIMIT, parse_mapping, schema_of, validate
+from sagline.files.yaml_text import YAML_LIMIT, PoseEntry, parse_mapping, schema_of, validate
 from sagline.robot.pose import Pose
 
 DEVIATIONS: Final = units(Sensors)

@@ -15,11 +15,10 @@ from sagline.core.arrays import FARTHEST, Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.fields import units
 from sagline.files.gcode_file import SUFFIXES, load_gcode
-from sagline.files.pose_text import PoseEntry
 from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
 from sagline.files.writing import write_text
-from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, dump_mapping, parse_mapping, validate
+from sagline.files.yaml_text import YAML_LIMIT, PoseEntry, YamlEntry, dump_mapping, parse_mapping, validate
 from sagline.motion.path import Path, path_from_samples
 from sagline.motion.rest_to_rest import quintic_path, septic_path
 from sagline.robot.drum import Drums, has_drum_data

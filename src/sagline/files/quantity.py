@@ -1,15 +1,20 @@
-"""Quantities in files: plain numbers in SI, or texts with a unit."""
+"""Quantities, poses and wrenches as text: plain numbers in SI, or texts with a unit."""
 
 from __future__ import annotations
 
 import re
 import reprlib
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from math import isinf, isnan
 from sys import float_info
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
+from sagline.core.arrays import FARTHEST, Array
 from sagline.core.errors import InvalidValueError
+from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -109,3 +114,41 @@ def _registry() -> UnitRegistry[Any]:
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)
+
+
+STRONGEST: Final = 1e12  # largest force and moment [N, N m]: larger than on any machine, and far below overflow
+POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
+WRENCH_STEP: Final = (
+    "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
+)
+
+
+def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
+    """Read plain decimal numbers from the texts `parts`."""
+    found = []
+    for part in parts:
+        number = plain_number(part)
+        if number is None or not abs(number) <= largest:  # the condition is True also for NaN
+            raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
+        found.append(number)
+    return found
+
+
+def pose_of_text(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose:
+    """Read a pose from "X,Y,Z" in meters, or "X,Y,Z,A,B,C" with angles about z, y and x in degrees."""
+    place = _three_or_six(text, item, "m or degrees", FARTHEST, step)
+    return Pose.from_euler(place[:3], *np.radians(place[3:]))
+
+
+def wrench_of_text(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
+    """Read a wrench from "fx,fy,fz" in N or "fx,fy,fz,mx,my,mz" in N and N m; None if the text is None."""
+    return None if text is None else np.array(_three_or_six(text, item, "N or N m", STRONGEST, step))
+
+
+def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
+    """Read three or six numbers separated by commas. Three numbers are completed by three zeros."""
+    parts = text.split(",", maxsplit=6)
+    if len(parts) not in (3, 6):
+        raise InvalidValueError(item, repr(text), "three or six numbers", step)
+    whole = decimal_numbers(parts, item, unit, largest)
+    return whole + [0.0] * (6 - len(whole))

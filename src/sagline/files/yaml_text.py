@@ -1,4 +1,4 @@
-"""YAML files of limited size with plain values; each mapping has a schema."""
+"""YAML files of limited size with plain values; each mapping has a schema, for example poses."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar, get_args
 
+import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
-from sagline.core.errors import FileError, did_you_mean
-from sagline.files.quantity import in_si, plain_number
+from sagline.core.arrays import FARTHEST, Array, checked
+from sagline.core.errors import FileError, InvalidValueError, did_you_mean
+from sagline.files.quantity import QUATERNION_TOLERANCE, in_si, plain_number
 from sagline.files.reading import error_at_line
+from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -50,6 +53,50 @@ class YamlEntry(BaseModel):
     def given(self, within: str = "") -> dict[str, Any]:
         """Quantities of all keys in the file, in SI units."""
         return {key: self.si(key, within) for key in self.units() if key in self.model_fields_set}
+
+
+_UNITS_STEP: Final = "Check its unit: numbers are meters, millimeters are written as 1500 mm."
+
+
+class _Euler(YamlEntry):
+    alpha: Any = 0.0
+    beta: Any = 0.0
+    gamma: Any = 0.0
+
+
+class PoseEntry(YamlEntry):
+    """Schema of a pose in a file."""
+
+    position: Any
+    euler: _Euler | None = None
+    quaternion: Any = None
+
+    def pose(self, item: str) -> Pose:
+        """The pose. InvalidValueError if it is invalid or too far away for any machine."""
+        position = _si_numbers(self.position, 3, "m", f"{item}.position")
+        if (far := float(np.abs(position).max())) > FARTHEST:
+            raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", _UNITS_STEP)
+        if self.quaternion is None:
+            euler = self.euler or _Euler()
+            angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
+            return Pose.from_euler(position, *_si_numbers(angles, 3, "rad", f"{item}.euler"))
+        if self.euler is not None:
+            value, step = "given with euler and quaternion", "Leave one of them out."
+            raise InvalidValueError(item, value, "one of the two, or none", step)
+        quaternion = _si_numbers(self.quaternion, 4, "", f"{item}.quaternion")
+        length = float(np.linalg.norm(quaternion))
+        if abs(length - 1.0) > QUATERNION_TOLERANCE:
+            wrong, allowed = f"the length of {item}.quaternion", f"1 to {QUATERNION_TOLERANCE:g}"
+            raise InvalidValueError(wrong, f"{length:.6g}", allowed, f"Correct {item}.")
+        return Pose.from_quaternion(position, quaternion / length)
+
+
+def _si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
+    """Convert `value` from a file to `count` numbers in SI, shape (count,)."""
+    numbers = checked(in_si(value, unit, item), item, unit)
+    if numbers.shape != (count,):
+        raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")
+    return numbers
 
 
 def schema_of(units_of_keys: Mapping[str, str]) -> Any:

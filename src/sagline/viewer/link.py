@@ -13,8 +13,7 @@ import viser
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.files.pose_text import decimal_numbers
-from sagline.files.quantity import plain_number
+from sagline.files.quantity import decimal_numbers, plain_number
 from sagline.files.robot_file import dump_robot
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -12,7 +12,7 @@ from urllib.parse import quote, urlencode
 import numpy as np
 
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.files.pose_text import STRONGEST, pose_of_text
+from sagline.files.quantity import STRONGEST, pose_of_text
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
