@@ -19,7 +19,6 @@ from sagline.article.experiment import (
     duration,
     experiment,
     in_process,
-    level_poses,
     points,
     with_cells,
 )
@@ -52,7 +51,7 @@ def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
         true = true.replace(winches=true.winches.replace(drum_radius=radius * (1.0 + 0.01 * errors[DRUM])))
     if errors.get(ZERO):
         assert true.winches is not None
-        zero = sl.inverse(robot, level_poses(HOME)).unstrained_length
+        zero = sl.inverse(robot, sl.Pose(HOME)).unstrained_length
         nominal = robot.replace(winches=robot.winches.replace(length_zero=zero))
         true = true.replace(winches=true.winches.replace(length_zero=zero + 1e-3 * errors[ZERO]))
     return true, nominal
@@ -100,7 +99,7 @@ def load_cells_are_off_by_their_noise_and_bias_alone(whole: Experiment) -> None:
     off = whole.tension - whole.planned_tension
     np.testing.assert_allclose(off, np.tile(bias.load_cell_bias, (10, 1)), atol=0.6)  # mean over a second, and stiction
     # the part that lengths can correct: projection onto the null space of the lengths, from the stiffness
-    here = sl.stiffness(sl.inverse(ROBOT, level_poses(whole.table.desired[3])).state)
+    here = sl.stiffness(sl.inverse(ROBOT, sl.Pose(whole.table.desired[3])).state)
     slope = here.tension_sensitivity @ here.null_lengths
     seen = slope @ np.linalg.lstsq(slope, off[3])[0]
     assert whole.null_error[3] == pytest.approx(np.abs(seen).max(), rel=0.05)
@@ -112,7 +111,7 @@ def time_courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> N
     assert whole.time[-1] == pytest.approx(duration() - 12 * STOP, abs=0.2)
     assert (np.diff(whole.stops) > 0.0).all()
     assert np.abs(whole.cells - whole.planned).max() <= 10.0
-    home = sl.inverse(ROBOT, level_poses(HOME)).unstrained_length
+    home = sl.inverse(ROBOT, sl.Pose(HOME)).unstrained_length
     path = sl.quintic_path(points(), speed=0.06, rate=10.0)
     lengths = sl.inverse(ROBOT, path).unstrained_length - home
     planned = np.stack([np.interp(whole.time, path.time, column) for column in lengths.T], axis=1)
@@ -123,7 +122,7 @@ def time_courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> N
 
 @extended
 def test_a_cable_break_ends_the_experiment_with_place_and_reason() -> None:
-    twin = sl.twin.Machine(ROBOT, start=level_poses(HOME), faults=[f"cable 2 breaks at {STOP + 4.0:g} s"])
+    twin = sl.twin.Machine(ROBOT, start=sl.Pose(HOME), faults=[f"cable 2 breaks at {STOP + 4.0:g} s"])
     watch = StopObserver(lambda: twin.reading.position)
     with refused("the experiment, on the way to P1", kind=RefusedError) as caught:
         experiment(Controller(ROBOT, twin.link(), record=watch, seed=1), watch)
@@ -139,9 +138,9 @@ def test_errors_of_drums_and_zeros_of_a_pair_are_applied() -> None:
     assert nominal.winches.length_zero is not None
     assert true.winches.drum_radius == pytest.approx(0.99 * nominal.winches.drum_radius, rel=1e-12)
     assert true.winches.length_zero - nominal.winches.length_zero == pytest.approx(-6.5e-3, rel=1e-9)
-    twin = sl.twin.Machine(true, nominal=nominal, start=level_poses(HOME))
-    shorter = sl.inverse(ROBOT, level_poses(HOME)).unstrained_length - 6.5e-3
-    expected = sl.forward(ROBOT, shorter, start=level_poses(HOME)).pose.position
+    twin = sl.twin.Machine(true, nominal=nominal, start=sl.Pose(HOME))
+    shorter = sl.inverse(ROBOT, sl.Pose(HOME)).unstrained_length - 6.5e-3
+    expected = sl.forward(ROBOT, shorter, start=sl.Pose(HOME)).pose.position
     np.testing.assert_allclose(twin.reading.position, expected, atol=1e-6)
 
 
@@ -160,7 +159,7 @@ def test_the_tension_loop_does_not_correct_the_position_error(name: str) -> None
 
 @pytest.mark.soak
 def test_the_loop_removes_zero_errors_from_tensions_without_motion() -> None:
-    zero = sl.inverse(ROBOT, level_poses(HOME)).unstrained_length
+    zero = sl.inverse(ROBOT, sl.Pose(HOME)).unstrained_length
     wrong = np.random.default_rng(3).normal(size=8)
     wrong *= 2e-3 / np.sqrt(np.mean(wrong**2))
     assert ROBOT.winches is not None

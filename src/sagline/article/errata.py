@@ -98,7 +98,7 @@ def _euler_rates() -> Sequence[Number]:
 def _rank_of_h() -> Sequence[Number]:
     """Erratum 4: H^T H cannot be inverted."""
     robot = sl.load_robot(ROBOTS[0])
-    balance = sl.article_balance(robot, sl.Pose.from_euler(POSE, 0.0, 0.0, 0.0))
+    balance = sl.article_balance(robot, sl.Pose(POSE))
     square, h = balance.h.T @ balance.h, balance.h
     singular = np.linalg.svd(square, compute_uv=False)
     tension = h.T @ np.linalg.solve(h @ h.T, -balance.b)
@@ -114,7 +114,7 @@ def _rank_of_h() -> Sequence[Number]:
 def _lifted(force: float) -> float:
     """Vertical force of all cables together [N], after (49) is solved for the vertical force `force` [N]."""
     robot = sl.load_robot(ROBOTS[0])
-    pose = sl.Pose.from_euler(POSE, 0.0, 0.0, 0.0)
+    pose = sl.Pose(POSE)
     balance = sl.article_balance(robot, pose)
     wanted = np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
     tension = balance.h.T @ np.linalg.solve(balance.h @ balance.h.T, wanted - balance.b)
@@ -208,7 +208,7 @@ def _vertical_and_level() -> Sequence[Number]:
     level = sl.Catenary().from_tension(cable, chord, 0.0, 100.0, fits.GRAVITY)
     numbers: list[Number] = [("|tan φ| a microradian from vertical", abs(np.tan(0.5 * np.pi - NEARLY)), "")]
     for distance, label in ((1e-3, "1 mm"), (1e-6, "1 µm")):
-        pose = sl.Pose.from_euler(under + np.array([distance, 0.0, 0.0]), 0.0, 0.0, 0.0)
+        pose = sl.Pose(under + np.array([distance, 0.0, 0.0]))
         condition = float(np.linalg.cond(sl.article_balance(robot, pose).h))
         numbers.append((f"condition of H {label} from under an anchor", condition, ""))
         condition = float(np.linalg.cond(sl.structure_matrix(robot, pose)))

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import dist
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import sagline as sl
 from sagline import control
@@ -151,16 +151,17 @@ def in_process(
     """Run the experiment with a twin in this process, in lockstep."""
     planned = sl.load_robot(PROTOTYPE) if nominal is None else nominal
     real = with_cells(planned if true is None else true)
-    twin = sl.twin.Machine(real, nominal=planned, start=level_poses(HOME), seed=seed)
+    twin = sl.twin.Machine(real, nominal=planned, start=sl.Pose(HOME), seed=seed)
     watch = StopObserver(lambda: twin.reading.position, tell)
     return experiment(control.Controller(planned, twin.link(), loop=loop, record=watch, seed=seed), watch)
 
 
 def experiment(controller: control.Controller, watch: StopObserver) -> Experiment:
     """Run the experiment. Raise RefusedError if connection or homing fails, or if a fault ends the experiment."""
-    legs = _legs(controller.period)
+    places, rate = sl.Pose(points()), 1.0 / controller.period  # one sample per cycle
+    legs = [sl.quintic_path([here, there], speed=SPEED, rate=rate) for here, there in pairwise(places)]
     controller.connect()
-    controller.home(level_poses(HOME))
+    controller.home(sl.Pose(HOME))
     _stand(controller, "home")
     stops, plans, ends = [watch.seen()], list[sl.Plan](), [0.0]
     for name, leg in zip([*table2().points, "home"], legs, strict=True):
@@ -244,12 +245,6 @@ def _result(
     )
 
 
-def _legs(period: float) -> list[sl.Path]:
-    """Straight paths between consecutive points, as quintic polynomials of time, with one sample per `period` [s]."""
-    places = level_poses(points())
-    return [sl.quintic_path([places[k], places[k + 1]], speed=SPEED, rate=1.0 / period) for k in range(len(places) - 1)]
-
-
 def duration() -> float:
     """Duration of the experiment [s], including all stops at the ten poses and at home."""
     path = sl.quintic_path(points(), speed=SPEED, rate=10.0)
@@ -259,8 +254,3 @@ def duration() -> float:
 def points() -> Array:
     """Positions of all stops [m], shape (12, 3): home, the ten poses, and home."""
     return np.vstack((HOME, table2().desired, HOME))
-
-
-def level_poses(position: ArrayLike) -> sl.Pose:
-    """Poses at positions (..., 3), without rotation, as in the article."""
-    return sl.Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)

@@ -83,12 +83,8 @@ def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequen
     found = sl.forward(repeated, off_drum.reshape(-1, m), start=plan.state.pose[np.tile(np.arange(poses), count)])
     if not found.solved.all():
         index = int(np.argmin(found.solved))
-        raise sl.InvalidValueError(
-            "the changed robot",
-            f"without a stable equilibrium at pose {index % poses}",
-            "smaller changes",
-            "Reduce the change of the robot.",
-        )
+        without, step = f"without a stable equilibrium at pose {index % poses}", "Reduce the change of the robot."
+        raise sl.InvalidValueError("the changed robot", without, "smaller changes", step)
     return found.pose.position.reshape(count, poses, 3)
 
 

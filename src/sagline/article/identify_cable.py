@@ -141,12 +141,9 @@ def identify_cable(
     acceleration = number(gravity, "gravity", "m/s^2", above=0.0)
     sizes = {array.shape for array in data}
     if len(sizes) > 1 or data[0].size < len(names):
-        raise InvalidValueError(
-            "the measurements",
-            f"of shapes {sorted(sizes)}",
-            f"four arrays of equal length, at least {len(names)}",
-            "Give span, rise, length and tension of at least one measurement per unknown.",
-        )
+        allowed = f"four arrays of equal length, at least {len(names)}"
+        step = "Give span, rise, length and tension of at least one measurement per unknown."
+        raise InvalidValueError("the measurements", f"of shapes {sorted(sizes)}", allowed, step)
     errors = (
         number(length_error, "length_error", "m", above=0.0),
         number(tension_error, "tension_error", "N", above=0.0),

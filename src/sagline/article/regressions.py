@@ -138,15 +138,10 @@ def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStud
 def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
     line = fit_line(sampling.tensions, vertical)
     h_b = fit_factor(sampling.chords[:, None], line.intercept, axis=-2)
+    k_h_of_angle = fit_factor(sampling.densities, h_b)
     everywhere = np.broadcast_to(sampling.densities, h_b.shape)
-    return InterceptStudy(
-        sampling=sampling,
-        slope=line.slope,
-        intercept=line.intercept,
-        h_b=h_b,
-        k_h_of_angle=fit_factor(sampling.densities, h_b),
-        k_h=float(fit_factor(everywhere.ravel(), h_b.ravel())),
-    )
+    k_h = float(fit_factor(everywhere.ravel(), h_b.ravel()))
+    return InterceptStudy(sampling, line.slope, line.intercept, h_b, k_h_of_angle, k_h)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,14 +195,7 @@ def sag_study(sampling: Sampling) -> SagStudy:
     a_d = fit_factor(sampling.tensions**-2, excess)
     q_a = fit_factor(sampling.chords[:, None] ** 3, a_d, axis=-2)
     p_q = fit_factor(np.cos(sampling.angles)[:, None] ** 4, q_a, axis=-2)
-    return SagStudy(
-        sampling=sampling,
-        adjusting_length=excess,
-        a_d=a_d,
-        q_a=q_a,
-        p_q=p_q,
-        k_p=float(fit_factor(sampling.densities**2, p_q)),
-    )
+    return SagStudy(sampling, excess, a_d, q_a, p_q, k_p=float(fit_factor(sampling.densities**2, p_q)))
 
 
 class Constants(NamedTuple):
@@ -254,10 +242,8 @@ def published_range(sampling: Sampling) -> Constants:
     try:
         highest = float(np.exp(brentq(missing, *np.log(HIGHEST), xtol=1e-8)))
     except ValueError:  # no range of tensions within the search intervals gives the constants
-        raise sl.InvalidValueError(
-            "the sampled cables",
-            "cables for which no range of tensions gives the published constants",
-            f"lowest tensions in {LOWEST} N, highest in {HIGHEST} N",
-            "Sample chords and densities as the article did.",
-        ) from None
+        found = "cables for which no range of tensions gives the published constants"
+        allowed = f"lowest tensions in {LOWEST} N, highest in {HIGHEST} N"
+        step = "Sample chords and densities as the article did."
+        raise sl.InvalidValueError("the sampled cables", found, allowed, step) from None
     return constants(sampling.between(best_lowest(highest), highest))

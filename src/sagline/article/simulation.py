@@ -173,7 +173,7 @@ def _robots(study: PathStudy) -> Finding:
         figure = Sheet(figsize=(WIDTH, 3.4))
         figure.subplots_adjust(left=0.13, right=0.97, bottom=0.0, top=1.0)
         ax = figure.add_subplot(projection="3d")
-        draw_robot(run.plan.state.one_robot, sl.Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
+        draw_robot(run.plan.state.one_robot, sl.Pose(CORNER), ax)
         ax.set_title("")
         panels.append((figure, caption))
     return finding("robots", panels=panels)

@@ -129,7 +129,7 @@ def tour(rate: float = 10.0) -> tuple[sl.Plan, Array]:
 
 
 def _planned(robot: sl.Robot, positions: Array) -> sl.Plan:
-    return sl.inverse(robot, sl.Pose.from_euler(positions, 0.0, 0.0, 0.0), sl.Empirical(), METHOD)
+    return sl.inverse(robot, sl.Pose(positions), sl.Empirical(), METHOD)
 
 
 def _limits(robot: sl.Robot, error_of: causes.ErrorOf, plan: sl.Plan, found: causes.Explanation) -> tuple[float, Array]:

@@ -177,13 +177,13 @@ def experiment(
 
 def _apart_over_s7(true: sl.Robot, nominal: sl.Robot, seed: int, tell: Tell) -> Experiment:
     """Run the experiment in real time with a twin of `true`, which runs in another process and is connected by S7."""
-    from sagline.article.experiment import StopObserver, level_poses, with_cells
+    from sagline.article.experiment import StopObserver, with_cells
     from sagline.article.experiment import experiment as driven
     from sagline.article.ten_poses import HOME
     from sagline.twin.server import machine_in_process
 
     with (
-        machine_in_process(with_cells(true), nominal, level_poses(HOME), seed=seed) as (addresses, position),
+        machine_in_process(with_cells(true), nominal, sl.Pose(HOME), seed=seed) as (addresses, position),
         closing(sl.plc.S7Link(addresses, nominal)) as link,
     ):
         watch = StopObserver(position, tell)

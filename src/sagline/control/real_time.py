@@ -190,7 +190,7 @@ HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # depths of the poses below the frame anchors,
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
     """Load all kernels of a controller: run a homing, a path and jogs near the middle of `robot`. Ignore refusals."""
     middle, homing = _first_feasible(robot, model, method)
-    beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
+    beside = Pose(middle.position + np.array([MOVE, 0.0, 0.0]))
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)
     previous = None if homing is None else homing.plan
     point = _straight_set_point(robot, middle) if homing is None else homing.standing.step()
@@ -209,12 +209,12 @@ def load_kernels(robot: Robot, period: float, model: CableModel, method: Tension
 def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
     """First position with feasible tensions, and its plan. If no position is feasible, the middle and None."""
     for place in _probable_positions(robot):
-        pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
+        pose = Pose(place)
         with suppress(SaglineError):
             homing = Homing(robot, pose, model, method)
             homing.off = np.zeros(robot.cable_count)
             return pose, homing
-    return Pose.from_euler(_probable_positions(robot)[0], 0.0, 0.0, 0.0), None
+    return Pose(_probable_positions(robot)[0]), None
 
 
 def _straight_set_point(robot: Robot, pose: Pose) -> SetPoint:

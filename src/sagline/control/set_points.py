@@ -6,6 +6,7 @@ from math import ceil
 from typing import Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion, check_lead
@@ -334,16 +335,5 @@ class PlatformJog:
     def _at(self, share: float) -> tuple[Array, Array]:
         """Position and quaternion after the share `share` of the displacement."""
         by = share * self._by
-        half = 0.5 * float(np.linalg.norm(by[3:]))
-        x, y, z = 0.5 * np.sinc(half / np.pi) * by[3:]
-        w = np.cos(half)
-        a, b, c, d = self._pose.quaternion
-        turned = np.array(
-            [
-                w * a + x * d + y * c - z * b,
-                w * b - x * c + y * d + z * a,
-                w * c + x * b - y * a + z * d,
-                w * d - x * a - y * b - z * c,
-            ]
-        )
-        return self._pose.position + by[:3], turned / np.linalg.norm(turned)
+        turned = Rotation.from_rotvec(by[3:]) * self._pose.rotation
+        return self._pose.position + by[:3], turned.as_quat()

@@ -203,7 +203,7 @@ def _read(path: FilePath, settings: Settings, acceleration: float, rate: float) 
 
 def _path(samples: Samples, whole: bool = False) -> Path:
     """Path of samples without rotation; with its rests if it is the whole path."""
-    pose = Pose.from_euler(samples.position, 0.0, 0.0, 0.0)
+    pose = Pose(samples.position)
     turning = np.zeros_like(samples.velocity)
     twist, twist_rate = (locked(np.hstack((each, turning))) for each in (samples.velocity, samples.acceleration))
     return Path(locked(samples.time), pose, twist, twist_rate, rests=samples.rests if whole else None)

@@ -1,4 +1,4 @@
-"""Logs of other programs: a map of columns converts a CSV, .npz or .mat file to the CSV text of a log."""
+"""Logs of other programs: a map of columns converts a CSV, .npz or .mat file to the rows of a log."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import io
 import math
 import re
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -14,8 +15,8 @@ from pydantic import model_validator
 
 from sagline.core.errors import FileError, did_you_mean
 from sagline.files.quantity import plain_number
-from sagline.files.reading import read_bytes, read_text
-from sagline.files.table import TABLE_LIMIT, csv_rows, line_error, lines_above_header
+from sagline.files.reading import read_bytes
+from sagline.files.table import TABLE_LIMIT, CsvRow, commented_rows, line_error
 from sagline.files.yaml_text import YamlEntry
 
 ARRAYS: Final = (".npz", ".mat")  # files with arrays; their rows have the line numbers from 2
@@ -50,8 +51,8 @@ class _Source(NamedTuple):
     comments: list[str]  # lines above the header
 
 
-def log_text(path: Path, columns: Mapping[str, ColumnEntry] | None) -> str:
-    """CSV text of a log from a file of another form. None: the names in the file are those of a log."""
+def log_rows(path: Path, columns: Mapping[str, ColumnEntry] | None) -> tuple[list[str], Iterator[CsvRow]]:
+    """Comments and rows of a log from a file of another form. None: the names in the file are those of a log."""
     source = _read_arrays(path) if path.suffix.lower() in ARRAYS else _read_csv(path)
     if columns is None:
         columns = {
@@ -72,11 +73,10 @@ def log_text(path: Path, columns: Mapping[str, ColumnEntry] | None) -> str:
     if len({*map(len, table.values())}) > 1:
         sizes = ", ".join(f"{name} {len(column)}" for name, column in table.items())
         raise FileError(path, f"has columns of different lengths: {sizes}", _CORRECT, item="columns")
-    rows = {source.header: list(table), **dict(zip(source.lines, zip(*table.values(), strict=True), strict=False))}
-    lines = [*source.comments, *[""] * (max(rows) - len(source.comments))]
-    for line, row in rows.items():
-        lines[line - 1] = ",".join(f'"{cell}"' if "," in cell else cell for cell in row)
-    return "\n".join(lines) + "\n"
+    rows = chain(
+        [(source.header, list(table))], zip(source.lines, map(list, zip(*table.values(), strict=True)), strict=False)
+    )
+    return source.comments, ((line, row) for line, row in rows if "".join(row).strip())
 
 
 def _pairs(
@@ -110,13 +110,11 @@ def _scaled(cells: list[str], scale: float) -> list[str]:
 
 def _read_csv(path: Path) -> _Source:
     """Columns of a CSV file; the comments above the header stay."""
-    text = read_text(path, TABLE_LIMIT)
-    lines = text.split("\n")
-    above = lines_above_header(lines)
+    comments, found_rows = commented_rows(path)
     header, rows, numbers = 0, [], []
     names: list[str] = []
     units: dict[str, str] = {}
-    for line, row in csv_rows(path, "\n".join(lines[above:]), above):
+    for line, row in found_rows:
         if not names:
             header = line
             for cell in row:
@@ -131,7 +129,7 @@ def _read_csv(path: Path) -> _Source:
     if not rows:
         raise FileError(path, "has no rows", "Check that this is the file you mean.", item="columns")
     cells = {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
-    return _Source(cells, units, numbers, header, lines[:above])
+    return _Source(cells, units, numbers, header, comments)
 
 
 def _read_arrays(path: Path) -> _Source:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import nullcontext
 from difflib import get_close_matches
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -18,10 +19,10 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import FileError, did_you_mean
 from sagline.core.fields import units
 from sagline.files import table as tables
-from sagline.files.log_columns import ARRAYS, ColumnEntry, log_text
+from sagline.files.log_columns import ARRAYS, ColumnEntry, log_rows
 from sagline.files.path_file import EULER, QUATERNION
 from sagline.files.reading import read_text, value_errors
-from sagline.files.table import CsvTable, line_error
+from sagline.files.table import CsvRow, CsvTable, line_error
 from sagline.files.writing import write_text
 from sagline.files.yaml_text import YAML_LIMIT, PoseEntry, parse_mapping, schema_of, validate
 from sagline.robot.pose import Pose
@@ -75,15 +76,10 @@ class _LogMap(_Sensors):
     columns: dict[str, ColumnEntry]
 
 
-def _sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
-    """Sensors from the comments above the header, and the text without these comments."""
-    lines = text.split("\n")
-    count = tables.lines_above_header(lines)
-    said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
-    rows = "\n".join([""] * count + lines[count:])
-    if not any(said):
-        return Sensors(), rows
-    return validate(parse_mapping("\n".join(said), path), _Sensors, path).sensors(path), rows
+def _sensors_of_comments(comments: Iterable[str], path: Path) -> Sensors:
+    """Sensors from the comments above the header."""
+    said = [_key_line(line.rstrip("\r")) for line in comments]
+    return validate(parse_mapping("\n".join(said), path), _Sensors, path).sensors(path) if any(said) else Sensors()
 
 
 def _key_line(line: str) -> str:
@@ -111,11 +107,11 @@ def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
         yield f"# target: {sensors.target.tolist()}"
 
 
-def _read(path: Path, text: str) -> tuple[CsvTable, int]:
+def _read(path: Path, rows: Iterator[CsvRow]) -> tuple[CsvTable, int]:
     """Read the table and the number of its cables."""
-    header = next((line for line in text.split("\n") if line.strip()), "")
-    cells = [cell.partition("[")[0].strip() for cell in header.replace('"', "").split(tables.separator_of(text))]
-    found = [_NUMBERED.fullmatch(tables.column_of_cable(cell)) for cell in cells]
+    header = next(rows, (0, []))
+    names = [tables.column_of_cable(cell.partition("[")[0].strip()) for cell in header[1]]
+    found = [_NUMBERED.fullmatch(name) for name in names]
     lengths = [match for match in found if match and match[1] in ("count", "length")]
     cables = max((min(int(match[2]), _MOST - 1) + 1 for match in lengths), default=1)
     optional_units = {f"{kind}_{k}": _OF_CABLE[kind] for k in range(cables) for kind in _BESIDE}
@@ -124,7 +120,8 @@ def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     readings = {f"{kind}_{k}": _OF_CABLE[kind] for kind in ("count", "length") for k in range(cables)}
     commanded = {f"{name}{COMMANDED}": optional_units[name] for name in _POSE_COLUMNS}
     units = {"time": "s", **readings, **optional_units, **commanded}
-    table = CsvTable.read(path, text, units, gaps=frozenset((*readings, *optional_units)))
+    whole = chain((header,), rows) if names else rows
+    table = CsvTable.read(path, whole, units, gaps=frozenset((*readings, *optional_units)))
     kinds = [kind for kind in ("count", "length") if table.columns.keys() & set(tables.names_of_cables(kind, cables))]
     if len(kinds) != 1:
         what = "columns of counts and of lengths" if kinds else "neither columns count_0, ... nor length_0, ..."
@@ -205,7 +202,7 @@ def _commanded(table: CsvTable) -> Pose | None:
             raise line_error(table.path, table.header, f"missing column x{COMMANDED} beside commanded rotations")
         return None
     if rotation is None:
-        return Pose.from_euler(position, 0.0, 0.0, 0.0)
+        return Pose(position)
     return Pose.from_quaternion(position, rotation)
 
 
@@ -293,8 +290,8 @@ def read_log(
     if columns is not None:
         chosen, said = _map_of_columns(file_path(columns, "columns"))
     converted = chosen is not None or path.suffix.lower() in ARRAYS
-    text = log_text(path, chosen) if converted else read_text(path, tables.TABLE_LIMIT)
-    commented, rows = _sensors_of_comments(text, path)
+    comments, rows = log_rows(path, chosen) if converted else tables.commented_rows(path)
+    commented = _sensors_of_comments(comments, path)
     given = sensors or said or commented
     given = given.replace(**deviations) if deviations else given
     table, cables = _read(path, rows)

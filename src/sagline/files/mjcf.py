@@ -123,7 +123,7 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
     Examples:
         >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> pose = sl.Pose((1.0, 0.5, 2.0))
         >>> text = sl.dump_mjcf(robot, pose)
         >>> "<mujoco" in text
         True

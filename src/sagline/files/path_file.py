@@ -16,7 +16,7 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.fields import units
 from sagline.files.gcode_file import SUFFIXES, load_gcode
 from sagline.files.reading import read_text, value_errors
-from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
+from sagline.files.table import TABLE_LIMIT, CsvTable, csv_rows, line_error
 from sagline.files.writing import write_text
 from sagline.files.yaml_text import YAML_LIMIT, PoseEntry, YamlEntry, dump_mapping, parse_mapping, validate
 from sagline.motion.path import Path, path_from_samples
@@ -38,7 +38,7 @@ PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
 def _path_from_table(path: FilePath, text: str) -> Path:
-    table = CsvTable.read(path, text, UNITS)
+    table = CsvTable.read(path, csv_rows(path, text), UNITS)
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
     late = np.diff(time, prepend=-np.inf) < _LEAST_STEP
@@ -54,7 +54,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
     if "alpha" in table.columns:
         return path_from_samples(time, Pose.from_euler(position, *(table.columns[name] for name in EULER)))
     if "qx" not in table.columns:
-        return path_from_samples(time, Pose.from_euler(position, 0.0, 0.0, 0.0))
+        return path_from_samples(time, Pose(position))
     quaternion = np.stack([table.columns[name] for name in QUATERNION], axis=-1)
     return path_from_samples(time, Pose.from_quaternion(position, table.normalized(quaternion, "qx, qy, qz, qw")))
 

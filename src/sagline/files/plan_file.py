@@ -161,7 +161,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     Examples:
         >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> pose = sl.Pose((1.0, 0.5, 2.0))
         >>> sl.save_plan(sl.inverse(robot, pose), "run.nc")
         >>> bool(sl.load_plan("run.nc").feasible)
         True

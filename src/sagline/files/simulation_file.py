@@ -192,7 +192,7 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
     Examples:
         >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> pose = sl.Pose((1.0, 0.5, 2.0))
         >>> motion = sl.simulate(sl.inverse(robot, pose).state, duration=0.5)
         >>> motion.save("motion.nc")
         >>> sl.load_simulation("motion.nc").robot.cable_count

@@ -8,11 +8,11 @@ import io
 import os
 import re
 from array import array
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, NamedTuple, cast
+from typing import Final, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ _PLAIN_ROW = re.compile(
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?\s*")
 
 
+CsvRow: TypeAlias = tuple[int, list[str]]  # line number in the file, from 1, and cells
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CsvTable:
     """Table with columns of numbers in SI."""
@@ -48,19 +51,15 @@ class CsvTable:
     def read(
         cls,
         path: Path,
-        text: str,
+        rows: Iterable[CsvRow],
         units: Mapping[str, str],
         strangers: Mapping[str, str] = _NONE,
         gaps: Collection[str] = (),
     ) -> CsvTable:
-        """Read a CSV text; the first row contains the names of the columns, `name` or `name [unit]`.
-
-        Columns are separated by commas, or by semicolons or tabs. If no commas separate columns, decimal commas are
-        allowed.
-        """
+        """Read the rows of a table; the first row contains the names of the columns, `name` or `name [unit]`."""
         found: dict[str, float | None] = {}
         numbers, lines, header = array("d"), array("q"), 0
-        for line, row in csv_rows(path, text):
+        for line, row in rows:
             if not found:
                 found, header = _factors(path, line, row, units, strangers), line
             else:
@@ -113,17 +112,20 @@ class CsvTable:
         return np.asarray(quaternion / length[:, None])
 
 
-def lines_above_header(lines: Sequence[str]) -> int:
-    """Number of blank lines and comments above the header."""
-    return next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
+def commented_rows(path: Path) -> tuple[list[str], Iterator[CsvRow]]:
+    """Blank lines and comments above the header of a CSV file, and the rows from the header on."""
+    lines = read_text(path, TABLE_LIMIT).split("\n")
+    written = (k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#"))
+    above = next(written, len(lines))
+    return lines[:above], csv_rows(path, "\n".join(lines[above:]), above)
 
 
-def csv_rows(path: Path, text: str, above: int = 0) -> Iterator[tuple[int, list[str]]]:
-    """Line number and cells of each row of a CSV text that is not blank, the header first; points for decimal commas.
-
-    `above`: number of lines of the file above the text.
-    """
-    mark, is_header = separator_of(text), True
+def csv_rows(path: Path, text: str, above: int = 0) -> Iterator[CsvRow]:
+    """Rows of a CSV text that are not blank, the header first. `above`: number of lines of the file above the text."""
+    # Columns are separated by commas, or, if the header has no comma, by semicolons or tabs. Decimal commas between the
+    # latter become points.
+    header = re.sub(r"\[.*?\]", "", next((line for line in text.split("\n") if line.strip()), "")).strip()
+    mark, is_header = next((mark for mark in ",;\t" if mark in header), ","), True
     reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
     try:
         for row in reader:
@@ -135,12 +137,6 @@ def csv_rows(path: Path, text: str, above: int = 0) -> Iterator[tuple[int, list[
             yield above + reader.line_num, row
     except csv.Error as error:
         raise line_error(path, above + reader.line_num, f"it is not CSV ({error})") from None
-
-
-def separator_of(text: str) -> str:
-    """Separator of the columns of a CSV text: a comma, or, if the first row has no comma, a semicolon or a tab."""
-    header = re.sub(r"\[.*?\]", "", next((line for line in text.split("\n") if line.strip()), "")).strip()
-    return next((mark for mark in ",;\t" if mark in header), ",")
 
 
 def column_of_cable(name: str) -> str:
@@ -226,7 +222,7 @@ def load_readings(
     other, hint = _OTHERS[kind]
     units = {"time": "s", **dict.fromkeys(names, "m" if kind == "length" else "")}
     strangers = dict.fromkeys(names_of_cables(other, cable_count), hint)
-    table = CsvTable.read(path, read_text(path, TABLE_LIMIT), units, strangers)
+    table = CsvTable.read(path, csv_rows(path, read_text(path, TABLE_LIMIT)), units, strangers)
     table.check_columns(names, f"; the robot has {cable_count} cables")
     table.check_rows()
     for name in names if kind == "length" else ():
@@ -272,7 +268,7 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
         >>> sl.load_measurements("cable.csv")  # doctest: +SKIP
     """
     path = file_path(file)
-    table = CsvTable.read(path, read_text(path, TABLE_LIMIT), UNITS)
+    table = CsvTable.read(path, csv_rows(path, read_text(path, TABLE_LIMIT)), UNITS)
     table.check_columns(UNITS, f"; found: {', '.join(table.columns)}")
     for name, unit in UNITS.items():
         if name != "rise":

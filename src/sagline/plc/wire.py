@@ -40,12 +40,8 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
     for i, text in enumerate(texts):
         address = _address(i, text, port)
         if address in addresses:
-            raise InvalidValueError(
-                f"address of group {i}",
-                f"{address}, as that of group {addresses.index(address)}",
-                "one PLC per group",
-                "Give each group its own address.",
-            )
+            given, step = f"{address}, as that of group {addresses.index(address)}", "Give each group its own address."
+            raise InvalidValueError(f"address of group {i}", given, "one PLC per group", step)
         addresses.append(address)
     return tuple(addresses)
 
@@ -56,12 +52,9 @@ def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[i
     winches = known.cable_count if isinstance(known, Robot) else whole_number(known, "robot", 1, MOST_ADDRESSES)
     groups = groups_of(winches)
     if len(addresses) != len(groups):
-        raise InvalidValueError(
-            "number of PLC addresses",
-            len(addresses),
-            f"{len(groups)}: two winches per group, {winches} winches",
-            "Give one address per group, in the groups' order, with commas between them.",
-        )
+        allowed = f"{len(groups)}: two winches per group, {winches} winches"
+        step = "Give one address per group, in the groups' order, with commas between them."
+        raise InvalidValueError("number of PLC addresses", len(addresses), allowed, step)
     return groups
 
 
@@ -80,12 +73,9 @@ def _address(index: int, text: object, port: int) -> Address:
     if colon:
         known = known and number.isascii() and number.isdecimal() and 0 < int(number[:6]) <= LAST_PORT
     if not known:
-        raise InvalidValueError(
-            f"address of group {index}",
-            brief(text),
-            f"host, host:port or [IPv6]:port, port 1 to {LAST_PORT}",
-            "The twin prints its addresses; TIA Portal shows the address of a PLC.",
-        )
+        allowed = f"host, host:port or [IPv6]:port, port 1 to {LAST_PORT}"
+        step = "The twin prints its addresses; TIA Portal shows the address of a PLC."
+        raise InvalidValueError(f"address of group {index}", brief(text), allowed, step)
     return Address(host, int(number) if colon else port)
 
 

@@ -329,13 +329,11 @@ def _result(future: Any) -> tuple[float, tuple[int, ...]]:
 
 
 def _is_free(port: int) -> bool:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HERE, port))
-        except OSError:
-            return False
-    return True
+    try:
+        with socket.create_server((HERE, port)):
+            return True
+    except OSError:
+        return False
 
 
 def _first_line(error: BaseException) -> str:

@@ -72,9 +72,6 @@ def _check_free(host: str, port: int) -> str:
             return number
     except (OSError, OverflowError, ValueError, TypeError) as error:  # an invalid name causes the last two exceptions
         reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidValueError(
-            "address of the twin",
-            f"{host!r}, port {port} ({reason})",
-            "a free port at an address of this machine",
-            "Choose another port with --port, or stop the program that uses the port.",
-        ) from None
+        found, allowed = f"{host!r}, port {port} ({reason})", "a free port at an address of this machine"
+        step = "Choose another port with --port, or stop the program that uses the port."
+        raise InvalidValueError("address of the twin", found, allowed, step) from None

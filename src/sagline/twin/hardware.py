@@ -105,7 +105,7 @@ def _start_pose(robot: Robot, start: Any) -> Pose:
         allowed = f"a pose, because {robot.name} has no test_box"
         step = "Give the pose at which encoders are set: start=Pose.from_euler([0, 0, 1.5], 0, 0, 0)."
         raise InvalidValueError("start", "not given", allowed, step)
-    return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
+    return Pose(0.5 * (robot.test_box.low + robot.test_box.high))
 
 
 def _winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
