@@ -221,15 +221,12 @@ def _result(
     ]
     rates = [plan.length_rate for plan in plans]
     time, cells, expected, lengths = np.split(np.array(watch.courses), [1, 1 + m, 1 + 2 * m], axis=1)
+    at_stops = {"true": true, "estimated": estimated, "tension": tension, "planned_tension": planned}
     return Experiment(
         table=table2(),
         robot=controller.robot,
-        true=locked(true[:-1].copy()),
-        estimated=locked(estimated[:-1].copy()),
-        tension=locked(tension[:-1].copy()),
-        planned_tension=locked(planned[:-1].copy()),
+        **{name: locked(values[:-1].copy()) for name, values in (at_stops | {"correction": correction}).items()},
         null_error=locked(np.abs(seen[:-1]).max(axis=1)),
-        correction=locked(correction[:-1].copy()),
         back=locked(true[-1] - stops[0][0]),
         time=locked(time[:, 0].copy()),
         cells=locked(cells.copy()),

@@ -118,9 +118,6 @@ def _psi(studies: list[_FeasibleSets]) -> Finding:
             (figure, f"The set ψ for L = {n(length, '.5g', 'm')} and three tolerances.", legend),
             (second, caption, legend),
         ),
-        extents=", ".join(
-            (f"{n(x, '.3g', 'N')} at {n(1000.0 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
-        ),
     )
 
 

@@ -97,28 +97,14 @@ def _measured() -> Finding:
     cable, rows, numbers = simulated_cable(), [], []
     for name, lowest, highest, unknowns in CASES:
         fit = _made_up_fit(cable, lowest, highest, unknowns)
-        rows.append(
-            (
-                f"{name} ({n(lowest)} to {n(highest, unit='N')})",
-                *(
-                    n(value, unit=UNITS[unknown], uncertainty=error)
-                    for unknown, value, error in zip(unknowns, fit.values, fit.standard_error, strict=True)
-                ),
-                *["–"] * (3 - len(unknowns)),
-                n(fit.chi_squared, ".2f"),
-                "; ".join(fit.warnings) or "none",
-            )
-        )
-        numbers.append(
-            {
-                "case": name,
-                "names": unknowns,
-                "values": fit.values,
-                "standard_error": fit.standard_error,
-                "correlation": fit.correlation,
-                "warnings": fit.warnings,
-            }
-        )
+        found = zip(unknowns, fit.values, fit.standard_error, strict=True)
+        values = [n(value, unit=UNITS[unknown], uncertainty=error) for unknown, value, error in found]
+        values += ["–"] * (3 - len(unknowns))
+        tensions, told = f"{name} ({n(lowest)} to {n(highest, unit='N')})", "; ".join(fit.warnings) or "none"
+        rows.append((tensions, *values, n(fit.chi_squared, ".2f"), told))
+        saved = ("names", "values", "standard_error", "correlation", "warnings")
+        numbers.append({"case": name, **{each: getattr(fit, each) for each in saved}})
+    head = ("chord tensions", "ρ", "EA", "offset", "χ² per freedom", "warnings")
     return finding(
         "cable-fit",
         numbers={
@@ -129,13 +115,7 @@ def _measured() -> Finding:
             "tension_error_N": TENSION_ERROR,
             "cases": numbers,
         },
-        data=(
-            Table(
-                "Results, with the standard uncertainty of the last digits in parentheses",
-                ("chord tensions", "ρ", "EA", "offset", "χ² per freedom", "warnings"),
-                rows,
-            ),
-        ),
+        data=(Table("Results, with the standard uncertainty of the last digits in parentheses", head, rows),),
     )
 
 

@@ -159,14 +159,7 @@ def identify_empirical(
     model = Empirical(k_h.value, k_p.value)
     found = model.from_tension(cable, span, rise, chord_tension, gravity)
     return EmpiricalFit(
-        model=model,
-        k_h=k_h,
-        k_p=k_p,
-        cable=cable,
-        gravity=gravity,
-        spans=axes[0],
-        rises=axes[1],
-        tensions=axes[2],
+        *(model, k_h, k_p, cable, gravity, *axes),
         force_residual=found.vertical_force - exact.vertical_force,
         length_residual=found.unstrained_length - exact.unstrained_length,
         position_error=_end_position_error(found),

@@ -9,7 +9,6 @@ import numpy as np
 import sagline as sl
 from sagline.article.drawing import Drawing, axes, chapter, finding
 from sagline.article.simulation import ROBOTS
-from sagline.core.numbers import n
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, table_of
@@ -37,11 +36,6 @@ def _pair(name: str) -> Pair:
 
 def _volumes(pairs: dict[str, Pair]) -> Finding:
     change = {name: exact.volume / straight.volume - 1.0 for name, (exact, straight) in pairs.items()}
-    volumes = "; ".join(
-        f"{name}: {n(exact.volume, '.1f')} m³ with sag, {n(straight.volume, '.1f')} m³ on straight cables, "
-        f"{n(100.0 * change[name], '+.2f', '%')}"
-        for name, (exact, straight) in pairs.items()
-    )
     return finding(
         "volume",
         numbers={
@@ -64,7 +58,6 @@ def _volumes(pairs: dict[str, Pair]) -> Finding:
                 ("change [%]", [100.0 * each for each in change.values()], "+.2f"),
             ),
         ),
-        volumes=volumes,
     )
 
 
@@ -75,10 +68,7 @@ def _boundaries(pairs: dict[str, Pair]) -> Finding:
         for pair in pairs.values()
         for normal, at in ((2, HEIGHT), (1, 0.0))
     )  # fmt: skip
-    distances = ", ".join(f"{name} {n(value, '.2g', 'm')}" for name, value in apart.items())
-    return finding(
-        "boundary", numbers={"height_m": HEIGHT, "farthest_apart_m": apart}, panels=panels, distances=distances
-    )
+    return finding("boundary", numbers={"height_m": HEIGHT, "farthest_apart_m": apart}, panels=panels)
 
 
 def _panel(pair: Pair, normal: int, at: float) -> Drawing:
