@@ -231,7 +231,7 @@ def draw_errors(
         for sign, seen in ((1.0, np.max(error) >= lines[0]), (-1.0, np.min(error) <= -lines[0]))
         if seen
     ]
-    _number_lines(ax, max(drawn, key=_points))
+    _number_lines(ax, max(drawn, key=lambda one: sum(np.shape(path.vertices)[0] for path in one.get_paths())))
     key = ListedColormap(colors[:-1], under=GAP_COLOR, over=colors[-1])
     scale = matplotlib.cm.ScalarMappable(BoundaryNorm(edges, len(edges) - 1), key)
     bar = ax.figure.colorbar(scale, ax=ax, pad=0.02, extend="both", spacing="uniform")
@@ -271,7 +271,3 @@ def _along_longest(ax: Axes, path: Path) -> Array:
         return np.empty((0, 2))
     way, piece = max(zip(passed, pieces, strict=True), key=lambda pair: float(pair[0][-1]))
     return np.column_stack([np.interp(SHARES * way[-1], way, along) for along in piece.T])
-
-
-def _points(drawn: ContourSet) -> int:
-    return sum(np.shape(path.vertices)[0] for path in drawn.get_paths())

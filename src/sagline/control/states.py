@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from sagline.core.errors import MOST, SaglineError, shortened
+from sagline.core.errors import ThreePartError
 from sagline.core.results import Status
 
 
@@ -82,7 +82,7 @@ MOTION: Final = frozenset({State.HOMING, State.MOVING, State.JOGGING, State.PAUS
 OWNING: Final = frozenset(State) - {State.OFF, State.CONNECTING}
 
 
-class RefusedError(SaglineError):
+class RefusedError(ThreePartError):
     """Error: a request was rejected, and no command was sent.
 
     Attributes:
@@ -92,19 +92,12 @@ class RefusedError(SaglineError):
         item: Same text as `what`, because all errors have this attribute.
     """
 
+    between = " is refused: "
+
     def __init__(self, what: str, reason: str, next_step: str) -> None:
         """Compose the message from its three parts."""
         super().__init__(what, reason, next_step)
-        self.what = self.item = what
-        self.reason = reason
-        self.next_step = next_step
-
-    def __str__(self) -> str:
-        """One line: request, reason, next step."""
-        what, reason, next_step = shortened(
-            (self.what, self.reason, self.next_step), room=MOST - len(" is refused: . ")
-        )
-        return f"{what} is refused: {reason}. {next_step}"
+        self.what = what
 
 
 def check_transition(state: State, to: State, what: str) -> None:

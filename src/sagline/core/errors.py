@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 _WORD: Final = 60  # number of first characters of a text that are compared with known words
 LONGEST: Final = 299  # largest number of characters of a printed message; a longer message is shortened
@@ -60,6 +60,23 @@ class NoSuchEntryError(InvalidValueError, IndexError):
 
 class NoBatchError(InvalidValueError, TypeError):
     """A single pose, cable or equilibrium was used as a batch."""
+
+
+class ThreePartError(SaglineError):
+    """Base class of errors whose message is an item, a reason, and the next step for the reader."""
+
+    between: ClassVar[str] = ": "  # text between item and reason
+
+    def __init__(self, item: str, reason: str, next_step: str) -> None:
+        """Compose the message from its three parts."""
+        super().__init__(item, reason, next_step)
+        self.item, self.reason, self.next_step = item, reason, next_step
+
+    def __str__(self) -> str:
+        """One line: item, reason, next step."""
+        room = MOST - len(f"{self.between}. ")
+        item, reason, next_step = shortened((self.item, self.reason, self.next_step), room)
+        return f"{item}{self.between}{reason}. {next_step}"
 
 
 class FileError(SaglineError):

@@ -185,12 +185,7 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
             pairs = enumerate(known.pop(name))
             part = [{"name": name, "index": index, "value": value} for index, value in pairs if value is not None]
             known[PARTIAL] = known.get(PARTIAL, []) + part
-        yield _text(known)
-
-
-def event_message(event: Event) -> bytes:
-    """Message of an event, with all its data."""
-    return _text({**event._asdict(), "kind": event.kind.value, "state": event.state.name})
+        yield message_of(known)
 
 
 def event_of(text: bytes) -> Event:
@@ -203,11 +198,6 @@ def event_of(text: bytes) -> Event:
         raise ValueError(f"no event ({error})") from None
 
 
-def truth_text(time: float, position: Any, quaternion: Any) -> bytes:
-    """Message of the true pose of the platform, with all digits."""
-    return _text({"time": time, "position": position.tolist(), "quaternion": quaternion.tolist()})
-
-
 def _json_values(values: NDArray[Any]) -> list[Any]:
     """Convert values for JSON. A number that is not finite becomes None, and so does a row without finite numbers."""
     known = np.isfinite(values)
@@ -217,7 +207,8 @@ def _json_values(values: NDArray[Any]) -> list[Any]:
     return rows if values.ndim == 1 else [row if there else None for row, there in zip(rows, known.any(1), strict=True)]
 
 
-def _text(said: dict[str, Any]) -> bytes:
+def message_of(said: dict[str, Any]) -> bytes:
+    """Message in JSON, with all digits."""
     return json.dumps(said, separators=(",", ":"), ensure_ascii=False).encode()
 
 

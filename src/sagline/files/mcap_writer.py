@@ -129,11 +129,13 @@ class McapFile:
 
     def event(self, event: Event) -> None:
         """Write an event."""
-        self._message(mcap_layout.EVENT, self.stamp(event.time), mcap_layout.event_message(event))
+        said = {**event._asdict(), "kind": event.kind.value, "state": event.state.name}
+        self._message(mcap_layout.EVENT, self.stamp(event.time), mcap_layout.message_of(said))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
         """Write the true pose of the platform at the time `time` [s]."""
-        self._message(mcap_layout.TRUTH, self.stamp(time), mcap_layout.truth_text(time, position, quaternion))
+        said = {"time": time, "position": position.tolist(), "quaternion": quaternion.tolist()}
+        self._message(mcap_layout.TRUTH, self.stamp(time), mcap_layout.message_of(said))
 
     def close_chunk(self) -> None:
         """Write the current chunk to the file."""

@@ -57,7 +57,8 @@ def pack(
         whole, places = _whole(np.asarray(values), known.get(name, -1))
         order, small = smallest_differences(whole.reshape(len(whole) if whole.ndim else 1, -1) if whole.size else whole)
         heads.append((name, values.dtype.name, values.shape, places, order))
-        parts.append(_planes(small))
+        courses = np.ascontiguousarray(small.T).view(np.uint8)
+        parts.append(courses.reshape(-1, 8).T.tobytes())  # bytes of each column, grouped by weight
         rest()
     head = json.dumps(heads, separators=(",", ":")).encode()
     return compress(b"".join((len(head).to_bytes(4, "little"), head, *parts)), LEVEL)
@@ -142,12 +143,6 @@ def smallest_differences(whole: NDArray[np.int64], most: int = MOST_ORDER) -> tu
         whole = np.diff(whole, axis=0, prepend=np.int64(0)) if whole.size else whole  # overflow is reversible
     assert best is not None
     return best[1], best[2]
-
-
-def _planes(small: NDArray[np.uint64]) -> bytes:
-    """Bytes of each column, grouped by weight."""
-    courses = np.ascontiguousarray(small.T).view(np.uint8)
-    return courses.reshape(-1, 8).T.tobytes()
 
 
 def _values(column: _Column, planes: bytes) -> NDArray[Any]:

@@ -196,7 +196,7 @@ def _about(plan: CalibrationPoses) -> dict[str, Any]:
     numbers = plan.parameters
     given = {name: getattr(plan.sensors, name) for name in units(type(plan.sensors))}
     errors = {
-        f"{label} [{unit}]" if unit else label: _plain(error)
+        f"{label} [{unit}]" if unit else label: float(f"{error:.{_DIGITS}g}") if np.isfinite(error) else None
         for label, unit, error in zip(numbers.labels, numbers.units, plan.expected_error, strict=True)
     }
     return {
@@ -211,8 +211,3 @@ def _about(plan: CalibrationPoses) -> dict[str, Any]:
 def _round(row: Array, decimals: int) -> list[Any]:
     rounded: list[float] = (np.round(row, decimals) + 0.0).tolist()
     return rounded if decimals else [int(number) for number in rounded]
-
-
-def _plain(error: float) -> float | None:
-    """Expected error, rounded to few digits; None if it is unknown."""
-    return float(f"{error:.{_DIGITS}g}") if np.isfinite(error) else None

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple, Protocol
 
 from sagline.control.link import Refusal, groups_of
 from sagline.core.arguments import brief, whole_number
-from sagline.core.errors import MOST, InvalidValueError, SaglineError, shortened
+from sagline.core.errors import InvalidValueError, ThreePartError
 from sagline.plc.blocks import Block
 from sagline.robot.robot import Robot
 
@@ -91,7 +91,7 @@ def _is_ipv6(host: str) -> bool:
 ANSWER: Final = 0.5  # longest wait for an answer [s]; then the connection is opened again
 
 
-class LinkError(SaglineError):
+class LinkError(ThreePartError):
     """Error of a PLC that cannot be used.
 
     Attributes:
@@ -99,18 +99,6 @@ class LinkError(SaglineError):
         reason: Reason as text.
         next_step: Next step for the reader.
     """
-
-    def __init__(self, item: str, reason: str, next_step: str) -> None:
-        """Compose the message from its three parts."""
-        super().__init__(item, reason, next_step)
-        self.item = item
-        self.reason = reason
-        self.next_step = next_step
-
-    def __str__(self) -> str:
-        """One line: PLC, reason, next step."""
-        item, reason, next_step = shortened((self.item, self.reason, self.next_step), room=MOST - len(": . "))
-        return f"{item}: {reason}. {next_step}"
 
 
 class WireError(Exception):

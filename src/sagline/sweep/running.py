@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from importlib import import_module
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -25,7 +26,6 @@ from sagline.sweep.folder import (
     SweepFolder,
     check_made_here,
     check_package,
-    is_installed,
     make_folder,
     open_folder,
     request_digest,
@@ -158,7 +158,7 @@ def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
 @contextmanager
 def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
     """Dask client with workers on this computer; None if this process computes all tasks itself."""
-    if count > 1 and tasks > FEW and is_installed("distributed"):
+    if count > 1 and tasks > FEW and find_spec("distributed"):
         # A worker whose start runs the user's script again must end here. The parent process reports the reason.
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             raise SystemExit(1)
@@ -227,7 +227,6 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
 @contextmanager
 def _remote_workers(address: str) -> Iterator[Any]:
     """Connect to the scheduler at `address`, such as "tcp://10.0.0.1:8786"; SaglineError without workers there."""
-    check_address(address)
     check_package("distributed", "a scheduler")
     with _silence_dask():
         distributed = import_module("distributed")
@@ -304,7 +303,7 @@ def _silence_dask() -> Iterator[None]:
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
-        if is_installed("distributed"):
+        if find_spec("distributed"):
             import_module("distributed")  # imported first, because the import configures the loggers
         for logger in loggers:
             logger.setLevel(SILENT)

@@ -219,7 +219,9 @@ def _proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found
     waiting = np.isin(found.pose_status, UNDECIDED).reshape(len(poses), len(loads))
     along = loads @ robot.freedom.T
     size = _forces_at_hand(robot, loads)
-    for _ in range(ITERATIONS if _shares(robot, loads) else 0):
+    # one proof may decide several loads if all upper limits are finite
+    shared = len(loads) > 1 and bool(np.isfinite(robot.tension_max).all())
+    for _ in range(ITERATIONS if shared else 0):
         rows = np.flatnonzero(waiting.any(axis=1))
         if not rows.size:
             return proof
@@ -234,11 +236,6 @@ def _proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found
         waiting[rows] &= ~beyond
     _decide(robot, options, poses, loads, found, np.flatnonzero(waiting), proof)
     return proof
-
-
-def _shares(robot: Robot, loads: Array) -> bool:
-    """True if there are several loads and all upper limits are finite, so that one proof may decide several loads."""
-    return len(loads) > 1 and bool(np.isfinite(robot.tension_max).all())
 
 
 def _forces_at_hand(robot: Robot, loads: Array) -> Array:

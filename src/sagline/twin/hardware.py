@@ -202,11 +202,11 @@ class Hardware:
     ) -> None:
         """Begin with brakes on. `step`: time step of the simulation [s]. `period`: period of the PLCs [s]."""
         state, self._nominal, self._true = _initial_state(robot, nominal, start, surveyed)
-        self._simulator = Simulator(robot, state, winches="robot", step=step, damping=damping, seed=seed)
+        self.simulator = Simulator(robot, state, winches="robot", step=step, damping=damping, seed=seed)
         _check_step(robot, state, step, period)
-        self._simulator.hold()
+        self.simulator.hold()
         self._period, self.limits = period, _winch_limits(nominal, self._nominal)
-        m, winch, reading = robot.cable_count, robot.winches, self._simulator.reading
+        m, winch, reading = robot.cable_count, robot.winches, self.simulator.reading
         assert winch is not None
         self._full = np.full(m, np.inf) if winch.load_cell_range is None else winch.load_cell_range
         self._lever = drum_lever(robot, reading.length) / np.abs(winch.gear)
@@ -225,11 +225,6 @@ class Hardware:
         self._take(reading)
         self.read[RATE] = 0.0
 
-    @property
-    def reading(self) -> Reading:
-        """True state of the plant."""
-        return self._simulator.reading
-
     def simulate_period(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
         """Simulate a period. The set points change linearly to `length` [m] and `tension` [N]."""
         if powered != self._powered:
@@ -237,14 +232,14 @@ class Hardware:
         counts = np.rint(self._nominal.counts(np.array(length)))
         targets = self._true.lengths(counts - self._slip)
         weight, self._load_changed = self._weight if self._load_changed else None, False
-        self._take(self._simulator.step(targets, self._period, tension=tension, wrench=weight))
+        self._take(self.simulator.step(targets, self._period, tension=tension, wrench=weight))
 
     def _switch(self, powered: list[bool]) -> None:
         changed = [i for i, (now, before) in enumerate(zip(powered, self._powered, strict=True)) if now != before]
         if on := [i for i in changed if powered[i]]:
-            self._simulator.release(*on)
+            self.simulator.release(*on)
         if off := [i for i in changed if not powered[i]]:
-            self._simulator.hold(*off)
+            self.simulator.hold(*off)
         self._powered, self._torque_of_force = list(powered), self._lever * powered
 
     def _take(self, reading: Reading) -> None:
@@ -260,35 +255,24 @@ class Hardware:
             tension[cell] = kept * tension[cell] + added
         filtered += self._shares * (tension - filtered)
 
-    @property
-    def saturated(self) -> Array:
-        """Flags (m,), nonzero for each drive that is at its limit of torque or speed."""
-        return self._simulator.reading.saturated
-
     def spoil_cell(self, cell: int, words: str | None, value: float) -> None:
         """Begin a fault of a load cell, one of `KINDS`, or remove the fault."""
         if words is None:
             self._wrong.pop(cell, None)
-            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # the filter restarts from the next reading
+            self.read[FILTERED, cell] = self.simulator.reading.load_cell[
+                cell
+            ]  # the filter restarts from the next reading
         elif words == "is wrong by #":
             self._wrong[cell] = (1.0, value)
         else:
             fixed = {"sticks": self.read[CELL, cell], "saturates": self._full[cell], "fails": np.nan}.get(words, value)
             self._wrong[cell] = (0.0, float(fixed))
 
-    def break_cable(self, cable: int) -> None:
-        """Break a cable."""
-        self._simulator.cut(cable)
-
     def shift_encoder(self, winch: int, length: float) -> None:
         """Shift an encoder by the counts of `length` [m] of cable. The drive then moves the cable by this length."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
-        self._simulator.shift(-slip / self._true.per_meter[winch], winch)
-
-    def limit_force(self, winch: int, force: float) -> None:
-        """Limit the cable force of the drive of `winch` to `force` [N]."""
-        self._simulator.limit_force(force, winch)
+        self.simulator.shift(-slip / self._true.per_meter[winch], winch)
 
     def add_load(self, mass: float) -> None:
         """Add a mass at the platform's center of mass [kg]."""

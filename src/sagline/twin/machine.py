@@ -142,7 +142,7 @@ class Machine:
     @property
     def reading(self) -> Reading:
         """True state of the plant. Every period overwrites it."""
-        return self._hardware.reading
+        return self._hardware.simulator.reading
 
     def link(self, *, moves: bool = True) -> plc_link.MachineLink:
         """Link to the machine for a controller in this process.
@@ -245,7 +245,7 @@ class Machine:
         self._counter = self._counter % COUNTERS + 1
         groups[plc_link.COUNTER] = self._counter
         groups[plc_link.ECHO] = [program.echo for program in programs]
-        saturated = hardware.saturated.tolist()
+        saturated = hardware.simulator.reading.saturated.tolist()
         news = [(program.owner, program.status, program.fault, *program.powered) for program in programs], saturated
         if news != self._reported:
             self._reported = news
@@ -316,7 +316,7 @@ class Machine:
         elif item == "commands":
             self._commands = words if begins else ""
         elif item == "cable":
-            hardware.break_cable(which)
+            hardware.simulator.cut(which)
         elif item == "encoder":
             hardware.shift_encoder(which, value)
         elif item == "load":
@@ -327,7 +327,7 @@ class Machine:
             group = next(g for g, winches in enumerate(self.groups) if which in winches)
             self._programs[group].trip(which - self.groups[group][0], TRIPPED)
         else:
-            hardware.limit_force(which, value)
+            hardware.simulator.limit_force(value, which)
 
     def _spoil_group(self, group: int, words: str, begins: bool) -> None:
         kept = {"is taken": self._taken, "stops": self._stopped}.get(words)
