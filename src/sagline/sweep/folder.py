@@ -194,9 +194,14 @@ def check_made_here(folder: SweepFolder) -> None:
         raise FileError(folder.path, f"was begun with {folder.made_by}, and this is {here}", step)
 
 
+def is_installed(package: str) -> bool:
+    """True if an optional package is installed."""
+    return find_spec(package) is not None
+
+
 def check_package(name: str, purpose: str) -> None:
     """Raise InvalidValueError with an installation command if the optional package `name` is missing."""
-    if find_spec(name) is None:
+    if not is_installed(name):
         step = 'Install it: pip install "sagline[sweep]".'
         raise InvalidValueError(f"the package {name}", "not installed", f"installed, for {purpose}", step)
 

@@ -14,7 +14,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from importlib import import_module
-from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +25,7 @@ from sagline.sweep.folder import (
     SweepFolder,
     check_made_here,
     check_package,
+    is_installed,
     make_folder,
     open_folder,
     request_digest,
@@ -158,7 +158,7 @@ def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
 @contextmanager
 def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
     """Dask client with workers on this computer; None if this process computes all tasks itself."""
-    if count > 1 and tasks > FEW and find_spec("distributed"):
+    if count > 1 and tasks > FEW and is_installed("distributed"):
         # A worker whose start runs the user's script again must end here. The parent process reports the reason.
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             raise SystemExit(1)
@@ -303,7 +303,7 @@ def _silence_dask() -> Iterator[None]:
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
-        if find_spec("distributed"):
+        if is_installed("distributed"):
             import_module("distributed")  # imported first, because the import configures the loggers
         for logger in loggers:
             logger.setLevel(SILENT)
