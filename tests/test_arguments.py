@@ -10,10 +10,9 @@ import pytest
 
 import sagline as sl
 from sagline import FileError, InvalidValueError
-from sagline.core.arguments import choice, file_path, instance, label, whole_number
+from sagline.core.arguments import choice, file_path, instance, label, part_of, whole_number
 from sagline.core.arguments import text as text_of
 from sagline.core.errors import NoBatchError, NoSuchEntryError
-from sagline.core.indices import part_of
 from tests.refusal import refused
 
 ROBOT = sl.load_robot("cogiro")

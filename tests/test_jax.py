@@ -12,7 +12,6 @@ import pytest
 import sagline as sl
 import sagline.jax as sj
 from sagline.core.arrays import Array
-from sagline.jax import calls, functions
 from sagline.kernels.forward.sensitivity import least_stiffnesses
 from tests.refusal import refused
 from tests.shifted import CASES, COGIRO, FORWARD, POSE, SLANTED, Shifted, close
@@ -161,8 +160,8 @@ def test_single_precision_and_other_back_ends_are_refused(monkeypatch: pytest.Mo
             sj.inverse(COGIRO, POSE)
     finally:
         jax.config.update("jax_enable_x64", True)
-    calls.register.cache_clear()
-    monkeypatch.setattr(calls, "backend", lambda: "python")
+    sj.register.cache_clear()
+    monkeypatch.setattr(sj, "backend", lambda: "python")
     with refused("SAGLINE_BACKEND", "python", "c for sagline.jax"):
         sj.inverse(COGIRO, POSE)
 
@@ -176,9 +175,9 @@ def test_a_call_that_does_not_fit_an_entry_is_an_error_of_jax() -> None:
     reason = "no such entry"
     for entry, *arguments in ((no_entry, 1.0), (least_stiffnesses, np.ones((6, 6)), np.ones((1, 6, 6)))):
         with pytest.raises(jax.errors.JaxRuntimeError, match=reason):
-            jax.block_until_ready(calls.ffi_call(entry, *arguments, calls.ResultArray((1,))))
+            jax.block_until_ready(sj.ffi_call(entry, *arguments, sj.NewArray((1,))))
 
 
 @extended
 def test_the_examples_of_the_docstrings_print_what_they_say() -> None:
-    assert doctest.testmod(functions) == (0, 15)
+    assert doctest.testmod(sj) == (0, 15)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.core import memory
-from sagline.core.memory import check_memory, free_memory
+from sagline.core import arguments
+from sagline.core.arguments import check_memory, free_memory
 from tests.refusal import refused
 from tests.tiers import wide
 
@@ -27,7 +27,7 @@ def test_the_limit_of_the_process_is_considered(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_an_array_that_does_not_fit_is_refused_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "free_memory", lambda: 3e9)
+    monkeypatch.setattr(arguments, "free_memory", lambda: 3e9)
     check_memory("a path", 2.9e9, "Check the units.")
     with refused("the memory for a path", "6 GB", next_step="Check the units.", kind=sl.InvalidValueError) as caught:
         check_memory("a path", 6e9, "Check the units.")
@@ -38,7 +38,7 @@ def test_an_array_that_does_not_fit_is_refused_with_its_size(monkeypatch: pytest
 def test_requested_and_free_memory_are_printed_with_different_digits(
     monkeypatch: pytest.MonkeyPatch, size: float, free: float
 ) -> None:
-    monkeypatch.setattr(memory, "free_memory", lambda: free)
+    monkeypatch.setattr(arguments, "free_memory", lambda: free)
     with refused("the memory for position", kind=sl.InvalidValueError) as caught:
         check_memory("position", size, "Give fewer poses.")
     wanted, left = (float(number) for number in re.findall(r"(\S+) GB", str(caught.value)))
@@ -50,7 +50,7 @@ def test_paths_and_batches_check_the_memory_first(monkeypatch: pytest.MonkeyPatc
     robot = sl.load_robot("cogiro")
     poses = sl.Pose.from_euler(np.tile([1.0, 1.0, 2.0], (200_000, 1)), 0.0, 0.0, 0.0)
     lengths = np.full((200_000, 8), 10.0)
-    monkeypatch.setattr(memory, "free_memory", lambda: 110e6)
+    monkeypatch.setattr(arguments, "free_memory", lambda: 110e6)
     tracemalloc.start()
     for call in (
         lambda: sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=1e4),

@@ -13,8 +13,7 @@ import pint
 from matplotlib.figure import Figure
 
 import sagline as sl
-from sagline.core.results import Result
-from sagline.core.table import Tabular
+from sagline.core.results import Result, Tabular
 
 REFUSED, SAME, EITHER = "refused", "the same answer", "refused or answered"
 UNITS: pint.UnitRegistry[Any] = pint.UnitRegistry()

@@ -9,7 +9,7 @@ import numpy as np
 import sagline as sl
 from sagline.cli.lengths import _write_rows
 from sagline.cli.track import ConfirmedRun
-from sagline.core.table import csv_text
+from sagline.core.results import csv_text
 
 ROBOT = sl.load_robot("article-suspended").replace(winches=sl.Winch(pulley_radius=0.1, dead_cable=4.0))
 ENDS = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.5, 2.0]]), np.stack([np.eye(3)] * 2))

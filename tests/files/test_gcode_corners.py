@@ -207,7 +207,7 @@ def test_a_print_in_bounded_memory(tmp_path: Path) -> None:
 
 
 def test_a_path_that_does_not_fit_into_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sagline.core.memory.free_memory", lambda: 1e8)
+    monkeypatch.setattr("sagline.core.arguments.free_memory", lambda: 1e8)
     file = written(tmp_path, HEAD + "G1 X4000 F60\n")  # 4,000 s at 1 mm/s
     with refused("the memory for a path of 393,216 or more samples", next_step="Use gcode_parts, or a lower rate."):
         sl.load_gcode(file)

@@ -13,10 +13,9 @@ from sagline.article.regressions import fit_factor
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableState
 from sagline.cables.models import Catenary, Empirical
-from sagline.core.arguments import instance
+from sagline.core.arguments import check_memory, instance
 from sagline.core.arrays import Array, Flags, checked, kernel_input, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.kernels.cable.batch import batch_end
 

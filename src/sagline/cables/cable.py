@@ -11,11 +11,10 @@ import numpy as np
 from attrs import evolve, field, fields, frozen
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arguments import choice, flag
+from sagline.core.arguments import check_memory, choice, flag
 from sagline.core.arrays import Array, broadcast_shape, checked, locked, spread
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, rule
-from sagline.core.memory import check_memory
 from sagline.kernels import creep_strains
 
 

@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.cables.cable import Cable
-from sagline.core.arguments import instance, whole_number
+from sagline.core.arguments import batch_length, check_memory, instance, part_of, whole_number
 from sagline.core.arrays import Array, Codes, broadcast_shape, checked, kernel_input, locked, number
 from sagline.core.errors import CableGeometryError, InvalidValueError
-from sagline.core.indices import batch_length, part_of
-from sagline.core.memory import check_memory
 from sagline.core.results import Result, Status
 from sagline.kernels import batch_from_length, batch_from_tension, closures, codes, largest_sags, shape_points, tables
 

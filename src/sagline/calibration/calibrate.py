@@ -37,10 +37,9 @@ from sagline.calibration.screening import SPEED_LIMIT, moving_rows, reading_coun
 from sagline.calibration.search import cross_validate, search_from_priors
 from sagline.calibration.straight import rotation_error
 from sagline.core.arguments import callback, flag, instance, whole_number
-from sagline.core.arrays import Flags, Indices, locked
+from sagline.core.arrays import Flags, Indices, Progress, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted, n
-from sagline.core.progress import Progress
 from sagline.kernels import codes
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows

@@ -7,9 +7,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, Codes, Flags, Indices, locked
+from sagline.core.arrays import Array, Codes, Flags, Indices, Progress, blocks, locked
 from sagline.core.errors import CableGeometryError, InvalidValueError
-from sagline.core.progress import Progress, blocks
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.checks import ROTATING

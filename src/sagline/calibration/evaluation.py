@@ -20,9 +20,8 @@ from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown,
 from sagline.calibration.problem import Fit, FitProblem
 from sagline.calibration.result import Calibration
 from sagline.calibration.weak_identifiability import weak_directions
-from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, blocks, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 from sagline.robot.tolerances import Provenance
 from sagline.robot.winch import Winch

@@ -14,8 +14,8 @@ from sagline.calibration.log import Sensors, count_of_frequencies, reading_devia
 from sagline.calibration.observations import MachineTerms, unwhitened_slopes
 from sagline.calibration.parameters import Parameters, PriorUnits
 from sagline.calibration.straight import whitened_errors
+from sagline.core.arguments import evenly_spaced
 from sagline.core.arrays import Array, Flags, Indices, locked
-from sagline.core.indices import evenly_spaced
 from sagline.core.results import Result, Status
 from sagline.kernels import codes
 from sagline.kernels.calibration import kinds

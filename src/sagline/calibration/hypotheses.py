@@ -14,8 +14,8 @@ from sagline.calibration.least_squares import best_step, evaluate_step, solve
 from sagline.calibration.log import WinchLog
 from sagline.calibration.parameters import Unknown, parameters_of
 from sagline.calibration.problem import Evaluated, FitProblem, ReadingsTable, SearchState, start_of
+from sagline.core.arguments import evenly_spaced
 from sagline.core.arrays import Array, Indices
-from sagline.core.indices import evenly_spaced
 from sagline.robot.drum import Drums
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

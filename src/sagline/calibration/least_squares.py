@@ -18,9 +18,8 @@ from sagline.calibration.log import Sensors, count_of_frequencies, reading_devia
 from sagline.calibration.observations import BLOCK, NO_LOAD, MachineTerms, WhitenedRows, whitened_rows
 from sagline.calibration.problem import Evaluated, Fit, FitProblem, Normal, SearchState
 from sagline.calibration.straight import fit_poses, move_poses, straight_rows
-from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, Progress, blocks, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
 from sagline.kinematics.forward_rows import solve_forward_rows
 

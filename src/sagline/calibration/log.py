@@ -9,13 +9,11 @@ from attrs import evolve, field, fields, frozen
 from numpy.typing import ArrayLike
 
 from sagline.calibration import rest
-from sagline.core.arguments import choice, instance, optional, text
+from sagline.core.arguments import choice, instance, optional, part_of, text
 from sagline.core.arrays import Array, Flags, Indices, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
-from sagline.core.indices import part_of
-from sagline.core.results import Result, Saved, set_fields
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Saved, Tabular, set_fields
 from sagline.robot.pose import Pose, PoseLike, single_pose, unit
 from sagline.robot.robot import Robot
 

@@ -12,8 +12,7 @@ from sagline.cables.model import CableModel
 from sagline.calibration.further import FurtherRows, frequency_rows, swivel_rows, whitened_further
 from sagline.calibration.log import Sensors, load_cells_of, measures_yaw, reading_deviations
 from sagline.calibration.parameters import Parameters, slopes_of_values
-from sagline.core.arrays import Array, kernel_input, locked
-from sagline.core.progress import blocks
+from sagline.core.arrays import Array, blocks, kernel_input, locked
 from sagline.kernels import tables
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.observe import SWIVEL_NUMBERS, observe, swivel_readings

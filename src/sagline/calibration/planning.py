@@ -16,12 +16,10 @@ from sagline.calibration.findings import UNITS
 from sagline.calibration.log import READINGS, Sensors
 from sagline.calibration.observations import MachineTerms, predicted_rows
 from sagline.calibration.parameters import DEFAULT, Parameters, Unknown, correlation_root, parameters_of
-from sagline.core.arguments import callback, instance, optional, whole_number
-from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.arguments import callback, check_memory, instance, optional, whole_number
+from sagline.core.arrays import Array, Flags, Indices, Progress, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.core.numbers import SPACE, counted, n
-from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved
 from sagline.robot.checks import ROTATING
 from sagline.robot.drum import has_drum_data

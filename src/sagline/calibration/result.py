@@ -12,9 +12,8 @@ from sagline.calibration.findings import Findings, SensorDeviation
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import MachineTerms, unwhitened_slopes
 from sagline.calibration.straight import slopes_of_poses
-from sagline.core.arguments import choice, flag
+from sagline.core.arguments import choice, evenly_spaced, flag
 from sagline.core.arrays import Array, locked, numbers
-from sagline.core.indices import evenly_spaced
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, Saved
 from sagline.kernels import codes

@@ -13,9 +13,8 @@ from sagline.calibration.log import load_cells_of
 from sagline.calibration.observations import BLOCK, NO_LOAD, MachineTerms
 from sagline.calibration.outliers import EXAMINED, outliers_in
 from sagline.calibration.problem import Evaluated, Fit, FitProblem, SearchState, held_lengths, start_of
-from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, Progress, blocks, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress, blocks
 from sagline.kernels import codes
 from sagline.kernels.calibration import kinds
 from sagline.kinematics.forward import search

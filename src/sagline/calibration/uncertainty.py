@@ -11,9 +11,8 @@ from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import MachineTerms, unwhitened_slopes
 from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, parameters_of
-from sagline.core.arrays import Array, locked
+from sagline.core.arrays import Array, blocks, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import blocks
 from sagline.kernels import codes
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.uncertainty import Uncertainty

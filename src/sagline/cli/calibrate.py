@@ -208,7 +208,7 @@ def _plan_poses(name: str, count: int, given: _Options) -> int:
 
 def _written(found: sl.Calibration, wanted: list[Path], given: _Options, line: Any) -> list[Path]:
     """Write the result and the figure, and the robot if the fit has converged. Returns the files."""
-    from sagline.core.table import csv_text
+    from sagline.core.results import csv_text
 
     files = []
     for file in wanted:

@@ -76,7 +76,7 @@ def encoder(
 
 def _write_rows(plan: sl.Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
     """Write `rows` of solved samples with their times. `name` formats the head of a column. Returns the exit code."""
-    from sagline.core.table import csv_text
+    from sagline.core.results import csv_text
 
     kept = np.atleast_1d(plan.solved)
     header = [name.format(k) for k in range(len(rows[0]))]

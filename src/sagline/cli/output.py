@@ -23,7 +23,7 @@ from sagline.core.errors import FileError, printable
 from sagline.files.writing import check_files, check_folder, create_folder, write_text
 
 if TYPE_CHECKING:
-    from sagline.core.table import Table
+    from sagline.core.results import Table
 
 FigureMaker = Callable[[], Any]  # makes a figure of matplotlib, or the axes of a figure
 
@@ -172,7 +172,7 @@ class Output:
     def table(self, part: str, rows: Callable[[], Iterable[Sequence[object]] | Table]) -> None:
         """Write a table as CSV if tables are wanted. `rows` returns its rows, or a table of a result."""
         if self._given.table:
-            from sagline.core.table import Table, csv_text  # the help does not load it
+            from sagline.core.results import Table, csv_text  # the help does not load it
 
             found = rows()
             write_text(self.file(part), csv_text(found.rows if isinstance(found, Table) else found))

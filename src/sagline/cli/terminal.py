@@ -21,7 +21,7 @@ from sagline.files.writing import json_text
 if TYPE_CHECKING:
     from rich.progress import Progress, Task
 
-    from sagline.core.progress import Progress as ProgressCallback
+    from sagline.core.arrays import Progress as ProgressCallback
 
 PATIENCE = 2.0  # time [s] after which the progress line shows a bar and the remaining time
 FREE = 1 << 16  # width of output to a file or a pipe, in characters

@@ -13,8 +13,7 @@ from sagline.control.recording import CycleTable, Event
 from sagline.control.states import State
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
-from sagline.core.results import Result, Saved, Status
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Saved, Status, Tabular
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

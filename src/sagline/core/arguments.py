@@ -1,10 +1,11 @@
-"""Checks of arguments: instances, words, texts, whole numbers, callbacks, paths.
+"""Checks of arguments: instances, words, texts, whole numbers, indices, callbacks, paths, needed memory.
 
 `sagline.core.arrays` checks numbers and arrays of numbers.
 """
 
 from __future__ import annotations
 
+import contextlib
 import operator
 import os
 import re
@@ -16,8 +17,9 @@ from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sagline.core.errors import FileError, InvalidValueError, did_you_mean, printable
+from sagline.core.errors import FileError, InvalidValueError, NoBatchError, NoSuchEntryError, did_you_mean, printable
 
 T = TypeVar("T")
 
@@ -236,3 +238,110 @@ def _step_to(value: object, kind: type) -> str:
             if isinstance(getattr(value, part, None), kind):
                 return f"Give {name[0].lower()}.{part}."
     return HOW_TO_GET.get(kind.__name__, f"Give {_a(kind.__name__)}.")
+
+
+def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
+    """Checked index along the first axis of a batch: an integer, a slice, or an array of integers or booleans.
+
+    shape: shape of the batch, () for a single entry; single: name of a single entry in the message.
+    """
+    if not shape:
+        raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; use it directly.")
+    if isinstance(index, slice):
+        return _sliced(index, shape[0])
+    number = integer(index)
+    if number is not None:
+        if -shape[0] <= number < shape[0]:
+            return number
+        raise _no_entry(index, shape[0])
+    chosen = np.asarray(index) if isinstance(index, list | np.ndarray) else None
+    if chosen is None or chosen.ndim != 1 or not _names_entries(chosen, shape[0]):
+        raise _no_entry(index, shape[0])
+    return chosen if chosen.size else chosen.astype(np.int64)  # numpy converts an empty list to an array of floats
+
+
+def batch_length(shape: tuple[int, ...], single: str) -> int:
+    """Number of entries along the first axis of a batch of shape `shape`; single: name of an entry in the message."""
+    if not shape:
+        raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; use it directly.")
+    return shape[0]
+
+
+def _sliced(index: slice, size: int) -> slice:
+    try:
+        index.indices(size)
+    except (TypeError, ValueError):
+        raise _no_entry(index, size) from None
+    return index
+
+
+def _names_entries(chosen: NDArray[Any], size: int) -> bool:
+    if chosen.dtype == np.bool_:
+        return len(chosen) == size
+    if chosen.size == 0:
+        return True
+    return bool(chosen.dtype.kind in "iu" and int(chosen.min()) >= -size and int(chosen.max()) < size)
+
+
+def _no_entry(index: object, size: int) -> NoSuchEntryError:
+    allowed = f"{-size} to {size - 1}, a slice, or an array of such numbers or of {size} booleans"
+    if size == 0:
+        allowed = "a slice, because the batch is empty"
+    return NoSuchEntryError("index", brief(index), allowed, f"The batch has {size}; indices start at 0.")
+
+
+def true_runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First index and end of each run of True in `flags`, in order, shape (k, 2)."""
+    return np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))).reshape(-1, 2)
+
+
+def evenly_spaced(count: int, most: int) -> NDArray[np.int64]:
+    """At most `most` of the indices 0 to `count` - 1, at nearly equal steps, with the first and the last index."""
+    places = np.linspace(0, max(count - 1, 0), min(count, most))
+    return np.unique(places.round().astype(np.int64))
+
+
+UNASKED: Final = 1 << 26  # [bytes], smaller allocations are not checked
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # [bytes], measured memory per pose, and per cable and pose
+_BEHIND_BYTES = 72.0  # [bytes], measured memory per cable and pose for the routing
+_GROUPS: Final = (  # files that contain the memory limit and the used memory of a container
+    ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+    ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
+)
+
+
+def check_memory(item: str, size: float, next_step: str) -> None:
+    """Refuse an allocation of more than 64 MB that does not fit into memory; size [bytes]; item: its purpose."""
+    if size > UNASKED and size > (free := free_memory()):
+        # the message needs so many digits that the two numbers differ
+        digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)
+        wanted, left = f"{size / 1e9:.{digits}g} GB", f"<= {free / 1e9:.{digits}g} GB, which are free"
+        raise InvalidValueError(f"the memory for {item}", wanted, left, next_step)
+
+
+def check_poses(count: int, cable_count: int, behind: bool) -> None:
+    """Refuse kinematics of `count` poses that need too much memory; behind: True with pulleys or dead lengths."""
+    cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
+    size = count * (_POSE_BYTES + cable * cable_count)
+    check_memory(f"a batch of {count:,} poses", size, "Solve the batch in parts.")
+
+
+def free_memory() -> float:
+    """Free memory that computer, container and process limits allow [bytes]; infinite if the system reports none."""
+    free = [float("inf")]
+    with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf
+        free.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
+    with contextlib.suppress(OSError, ValueError, StopIteration):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        free.append(1024.0 * float(next(line for line in lines if line.startswith("MemAvailable")).split()[1]))
+    for limit, used in _GROUPS:
+        with contextlib.suppress(OSError, ValueError):  # ValueError: "max", no limit
+            free.append(float(Path(limit).read_text()) - float(Path(used).read_text()))
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        limit_of_process = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit_of_process != resource.RLIM_INFINITY:
+            taken = float(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            free.append(limit_of_process - taken)
+    return max(0.0, min(free))

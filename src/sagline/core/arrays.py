@@ -1,21 +1,20 @@
-"""Conversion of numbers to arrays for the kernels: float64, C-contiguous, read-only.
+"""Conversion of numbers to arrays for the kernels: float64, C-contiguous, read-only; blocks of rows.
 
 All arrays for kernels have the same memory layout, because a kernel is compiled again for every other layout.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from decimal import Decimal
 from numbers import Real
-from typing import Any, Final, TypeGuard
+from typing import Any, Final, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arguments import brief
+from sagline.core.arguments import brief, check_memory
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 
 AnyArray = NDArray[Any]
 Array = NDArray[np.float64]
@@ -233,3 +232,21 @@ def _check_range(
     ]
     allowed = ", ".join(b for b in bounds if b) or "a number"
     raise InvalidValueError(where, f"{array[index]:g} {unit}".rstrip(), allowed, f"Correct {where}.")
+
+
+# function that is called after each block with the number of finished rows and the number of all rows
+Progress: TypeAlias = Callable[[int, int], None]
+
+
+def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
+    """Slices that divide `count` rows into blocks of at most `size` rows; progress is called after each block."""
+    for first in range(0, count, size):
+        part = slice(first, min(first + size, count))
+        yield part
+        if progress is not None:
+            progress(part.stop, count)
+
+
+def rows_of(array: Array, part: slice) -> Array:
+    """Rows `part` of `array`. An array with a single row is for all entries, and is returned unchanged."""
+    return array if len(array) == 1 else array[part]

@@ -1,19 +1,27 @@
-"""Common base classes of results, which are immutable and can be pickled, displayed and saved; status codes."""
+"""Base classes of results, which are immutable and can be pickled, displayed and saved; tables; status codes."""
 
 from __future__ import annotations
 
+import csv
 import os
 import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from enum import IntEnum
 from importlib import import_module
 from inspect import getdoc
-from typing import Any, Final, Self
+from io import StringIO
+from types import MappingProxyType
+from typing import Any, ClassVar, Final, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sagline.core.arguments import file_path
 from sagline.core.arrays import locked
+from sagline.core.errors import FileError
+from sagline.core.numbers import counted
 
 # modules that are imported at the first display, because a normal import would be circular
 _PAGES = "sagline.notebook"
@@ -140,3 +148,212 @@ class Status(IntEnum):
         member._value_ = code
         member.text = text
         return member
+
+
+# module that is imported when a table is written, because `files` imports this module
+_WRITING: Final = "sagline.files.writing"
+_WIDTH, _ENDS = 80, 4  # width of a terminal; number of printed rows at each end of a table
+
+# Declaration of the columns of a result. A column is a text "label=attribute [unit]", or a tuple of this text and the
+# type of the status codes in the column. An attribute can be a path with dots, such as "pose.position"; a number after
+# a dot is an index of the last axis. In a label, # is replaced by the index of a cable, and @ by x, y, z (and w). The
+# default label is the name of the attribute. The default unit is the unit in the documentation of the attribute.
+Columns = tuple[str | tuple[str, type[Any]], ...]
+
+
+def csv_text(rows: Iterable[Sequence[object]]) -> str:
+    """Text of a CSV file: a line of column names with units, then rows with all digits of the numbers."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+class Table:
+    """Table with columns of equal length, each with a name and a unit.
+
+    Attributes:
+        columns: Dictionary from the name of each column to its numbers or words, shape (rows,).
+        units: Dictionary from the name of each column to its unit; "" for a column without a unit.
+    """
+
+    __slots__ = ("columns", "units")
+
+    def __init__(self, columns: Mapping[str, NDArray[Any]], units: Mapping[str, str]) -> None:
+        """Store columns and units."""
+        self.columns, self.units = MappingProxyType(dict(columns)), MappingProxyType(dict(units))
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.columns.values()), ()))
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Numbers or words of the column `name`, shape (rows,)."""
+        return self.columns[name]
+
+    @property
+    def head(self) -> list[str]:
+        """Names of the columns, with units in brackets."""
+        return [f"{name} [{self.units[name]}]" if self.units[name] else name for name in self.columns]
+
+    @property
+    def rows(self) -> list[list[object]]:
+        """Row of the column names, then all rows of values; "" for NaN."""
+        body = zip(*(column.tolist() for column in self.columns.values()), strict=True)
+        return [[*self.head], *(["" if cell != cell else cell for cell in row] for row in body)]
+
+    def __repr__(self) -> str:
+        """Text of the table that fits into a terminal: the first and last rows, and the first columns."""
+        count = len(self)
+        some = [*range(_ENDS), *range(count - _ENDS, count)] if count > 2 * _ENDS else list(range(count))
+        texts: list[list[str]] = []
+        for name, column in zip(self.head, self.columns.values(), strict=True):
+            cells = [name, *(f"{column[k]:.6g}" if column.dtype.kind in "fc" else str(column[k]) for k in some)]
+            width = max(map(len, cells))
+            if texts and sum(len(each[0]) + 2 for each in texts) + width > _WIDTH:
+                break
+            texts.append([cell.rjust(width) for cell in cells])
+        lines = ["  ".join(row) for row in zip(*texts, strict=True)]
+        if count > len(some):
+            lines.insert(_ENDS + 1, "...")
+        hidden = list(self.columns)[len(texts) :]
+        more = f"; not shown: {' to '.join(dict.fromkeys((hidden[0], hidden[-1])))}" if hidden else ""
+        return "\n".join([*lines, f"{counted(count, 'row')}, {len(self.columns)} columns{more}"])
+
+    def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
+        """Write the table as CSV; see `Tabular.to_csv`."""
+        text = csv_text(self.rows)
+        if file is None:
+            return text
+        import_module(_WRITING).write_text(file_path(file), text)
+        return None
+
+    def to_dataframe(self) -> Any:
+        """Convert the table to a DataFrame; see `Tabular.to_dataframe`."""
+        try:
+            pandas = import_module("pandas")
+        except ModuleNotFoundError:
+            raise FileError("package pandas", "is not installed", "A DataFrame needs it: pip install pandas") from None
+        frame = pandas.DataFrame(dict(self.columns))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+
+class Tabular:
+    """Base class of results that can be converted to a table with one row per pose, sample or mode."""
+
+    __slots__ = ()
+    _columns: ClassVar[Columns]
+
+    def table(self) -> Table:
+        """Create a table of the result; a printed table shows its first and last rows.
+
+        Returns:
+            Table; `table["x"]` is the column x, and `table.units["x"]` is its unit.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), [(0, 0, 2), (1, 1, 2)])
+            >>> plan.table()["T0"].round(1)
+            array([370.6, 302.4])
+        """
+        found = list(_columns_of(self))
+        return Table({name: values for name, values, _ in found}, {name: unit for name, _, unit in found})
+
+    def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
+        """Write the table of the result as CSV. The header contains units in brackets; an empty cell means NaN.
+
+        Args:
+            file: File, which is written atomically; None to return the text.
+
+        Returns:
+            The text, or None if a file was written.
+
+        Raises:
+            FileError: If the file cannot be written; an existing file is then unchanged.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), (0, 0, 2))
+            >>> print(plan.to_csv()[:24])
+            x [m],y [m],z [m],qx,qy,
+        """
+        return self.table().to_csv(file)
+
+    def to_dataframe(self) -> Any:
+        """Convert the table of the result to a pandas DataFrame.
+
+        Returns:
+            DataFrame with the columns of `table`; `attrs["units"]` contains the units of the columns.
+
+        Raises:
+            FileError: If pandas is not installed.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), [(0, 0, 2), (1, 1, 2)])
+            >>> plan.to_dataframe()["status"].tolist()
+            ['SOLVED', 'SOLVED']
+        """
+        return self.table().to_dataframe()
+
+    def to_xarray(self) -> Any:
+        """Convert the result to an xarray Dataset.
+
+        Returns:
+            Dataset with units and robot, as `save` writes it to a NetCDF file. The Dataset of a result without a NetCDF
+            format contains the columns of `table`, with the dimension `row`.
+
+        Raises:
+            InvalidValueError: If the result contains a cable model, a tension method or a criterion of your own.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), [(0, 0, 2), (1, 1, 2)])
+            >>> plan.to_xarray()["chord_tension"].dims
+            ('pose', 'cable')
+        """
+        return formats().dataset_of(self)
+
+
+def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
+    """Name, values (rows,) and unit of each column of a result's table."""
+    for declared in type(result)._columns:
+        text, codes = declared if isinstance(declared, tuple) else (declared, None)
+        text, _, unit = text.removesuffix("]").partition(" [")
+        label, _, place = text.rpartition("=")
+        value, units = _found(result, place)
+        if value is None:
+            continue
+        label, unit = label or place.rpartition(".")[2], unit or ", ".join(units)
+        if hasattr(value, "quaternion"):  # the value is a pose
+            yield from _spread(("x", "y", "z"), value.position, "m")
+            yield from _spread(("qx", "qy", "qz", "qw"), value.quaternion, "")
+        elif "#" in label or "@" in label:
+            parts = "xyzw"[: value.shape[-1]] if "@" in label else map(str, range(value.shape[-1]))
+            yield from _spread([label.replace("#", part).replace("@", part) for part in parts], value, unit)
+        elif codes is not None:
+            yield label, np.array([codes(int(code)).name for code in np.atleast_1d(value)]), ""
+        else:
+            yield label, np.atleast_1d(value), unit
+
+
+def _spread(names: Any, values: NDArray[Any], unit: str) -> Iterator[tuple[str, NDArray[Any], str]]:
+    """Column for each entry of `values` along the last axis; names: name of each column."""
+    for k, name in enumerate(names):
+        yield name, np.atleast_1d(values[..., k]), unit
+
+
+def _found(result: Any, place: str) -> tuple[Any, list[str]]:
+    """Value and documented units of the attribute `place`, such as "pose.position"; None if the value is missing."""
+    units: list[str] = []
+    for name in place.split("."):
+        if result is None:
+            break
+        if name.isdigit():
+            index, size = int(name), result.shape[-1]
+            units = units[index * len(units) // size :][:1]
+            result = result[..., index]
+        else:
+            units = documented_units(type(result), name)
+            result = getattr(result, name)
+    return result, units

@@ -10,10 +10,9 @@ from typing import Any, Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import brief, choice, file_path
+from sagline.core.arguments import brief, check_memory, choice, file_path
 from sagline.core.arrays import FARTHEST, Array, Indices, exactly, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.files.gcode_program import OFFSETS, Dialect, Settings, program_moves
 from sagline.files.reading import read_text
 from sagline.files.table import line_error

@@ -16,9 +16,8 @@ from typing import Any, Final, NamedTuple
 from numpy.typing import NDArray
 
 from sagline.control.recording import Event
-from sagline.core.arguments import file_path
+from sagline.core.arguments import check_memory, file_path
 from sagline.core.errors import FileError
-from sagline.core.memory import check_memory
 from sagline.files.mcap_layout import END, EVENT, EVERY, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
 from sagline.files.mcap_writer import check_packages
 from sagline.files.netcdf import check_version

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.core.memory import check_memory
+from sagline.core.arguments import check_memory
 
 if TYPE_CHECKING:
     from xarray import Dataset

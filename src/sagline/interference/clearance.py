@@ -10,13 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import brief, instance
-from sagline.core.arrays import Array, Indices, checked, locked, number
+from sagline.core.arguments import brief, check_memory, instance
+from sagline.core.arrays import Array, Indices, blocks, checked, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
-from sagline.core.progress import blocks
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere, extent_text
 from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, rod_row, rows_of_parts
 from sagline.kernels.interference import shapes

@@ -9,11 +9,10 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import instance, label
+from sagline.core.arguments import check_memory, instance, label
 from sagline.core.arrays import FARTHEST, Array, Flags, Indices, checked, exactly, locked, number, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import check_fields, checked_by, given, reduced
-from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
 from sagline.robot.pose import Pose, PoseLike, single_pose

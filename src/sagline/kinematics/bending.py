@@ -10,8 +10,7 @@ import numpy as np
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kinematics.plan import Plan
 
 MOST_ELEMENTS: Final = 100_000

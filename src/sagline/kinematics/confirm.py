@@ -9,10 +9,8 @@ import numpy as np
 
 from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance
-from sagline.core.arrays import Array, Codes, Flags, locked
-from sagline.core.progress import Progress, blocks
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.arrays import Array, Codes, Flags, Progress, blocks, locked
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_rows import ForwardSolution, iterate_routing, solve_forward_rows
 from sagline.kinematics.plan import Plan

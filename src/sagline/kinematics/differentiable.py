@@ -16,9 +16,8 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import instance
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, blocks
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import blocks
 from sagline.kernels import codes, forward_poses, inverse_poses, tables
 from sagline.kernels.cable import swivel
 from sagline.kernels.cable.geometry import CABLE_ROWS
@@ -76,18 +75,12 @@ class Inverse(NamedTuple):
     tension: Value
 
 
-class Work(NamedTuple):
-    """Work array of a kernel."""
-
-    shape: tuple[int, ...]
-    dtype: Any
-
-
-class ResultArray(NamedTuple):
-    """Array that a kernel fills, and which its call returns."""
+class NewArray(NamedTuple):
+    """Array that is allocated for a call of a kernel: a result, which the call returns, or a work array."""
 
     shape: tuple[int, ...]
     dtype: Any = np.float64
+    is_result: bool = True
 
 
 def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
@@ -95,9 +88,9 @@ def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
     outputs = []
 
     def real(value: Any) -> Any:
-        if isinstance(value, Work | ResultArray):
+        if isinstance(value, NewArray):
             array = np.empty(value.shape, value.dtype)
-            if isinstance(value, ResultArray):
+            if value.is_result:
                 outputs.append(array)
             return array
         if isinstance(value, tuple):
@@ -174,7 +167,9 @@ class Kinematics:
         self.limits = LIMITS_OF[robot.tension_limits_of], float("nan")
         self.weight = 0.0 if own.weightless else robot.cables.linear_density * robot.gravity
         self.rows = result_rows(robot)
-        self.memory = tuple(Work(array.shape, array.dtype) for array in memory_for(robot.cable_count))
+        self.memory = tuple(
+            NewArray(work.shape, work.dtype, is_result=False) for work in memory_for(robot.cable_count)
+        )
 
     def solve(self, *inputs: Value) -> tuple[Value, Value, Value]:
         """First result, tensions (N, m), and results of the kernels (N, rows, m)."""
@@ -199,11 +194,11 @@ class Kinematics:
         rest = self.numpy.broadcast_to(rest, (len(frame), *rest.shape[1:]))
         return self.freedom, self.body, self.numpy.concatenate((frame, platform, rest), axis=2)
 
-    def states(self, count: int) -> tuple[ResultArray, ...]:
+    def states(self, count: int) -> tuple[NewArray, ...]:
         """Outputs of `describe_states`."""
         m = self.cables
         shapes = (6, 6), (m, 3, 3), (swivel.DATA, m, 3), (m, 3), (m, 3), (m, 7)
-        return tuple(ResultArray((count, *shape)) for shape in shapes)
+        return tuple(NewArray((count, *shape)) for shape in shapes)
 
     def frame_end_tension(self, results: Value) -> Value:
         """Tensions at the frame ends (N, m) of `results` (rows, N, m)."""
@@ -241,13 +236,13 @@ class ForwardKinematics(Kinematics):
         lengths, wrench, frame, platform, start = inputs
         count, m, n, xp = len(lengths), self.cables, self.free, self.numpy
         given = *self.robots(frame, platform), lengths, start, wrench
-        works = tuple(Work(shape, np.float64) for shape in ((CABLE_ROWS, m), (n, n), (tables.LAST_COLUMNS,)))
+        works = tuple(NewArray(shape, is_result=False) for shape in ((CABLE_ROWS, m), (n, n), (tables.LAST_COLUMNS,)))
         found = (
-            ResultArray((count, tables.POSE_COLUMNS)),
-            ResultArray((self.rows, count, m)),
-            ResultArray((count, m), np.int8),
-            ResultArray((count, tables.FORWARD_NUMBERS)),
-            ResultArray((count,), np.int8),
+            NewArray((count, tables.POSE_COLUMNS)),
+            NewArray((self.rows, count, m)),
+            NewArray((count, m), np.int8),
+            NewArray((count, tables.FORWARD_NUMBERS)),
+            NewArray((count,), np.int8),
         )
         pose, results, _, _, status = self.call(forward_poses, self.terms, False, given, works, self.memory, found)
         stable = (status[:, None] == np.array(STABLE)).any(axis=1)[:, None]
@@ -262,7 +257,7 @@ class ForwardKinematics(Kinematics):
         found = self.call(
             *(sensitivity.sensitivities_of_states, self.terms, self.robots(frame, platform), first),
             *(results.swapaxes(0, 1), self.memory, self.states(count)),
-            tuple(ResultArray((count, *shape)) for shape in shapes),
+            tuple(NewArray((count, *shape)) for shape in shapes),
         )
         slopes, compliance, by_data, by_frame, by_platform = found[5:10]
         turn, rates = self.rotation(first[:, 3:]), self.rates(first[:, 3:])
@@ -306,13 +301,13 @@ class InverseKinematics(Kinematics):
         method = codes.QUADRATIC_PROGRAM, 0.0, codes.CHORD_TENSION, self.numpy.ones(m), shared
         given = self.robots(frame, platform), pose, wrench
         found = (
-            ResultArray((self.rows, count, m)),
-            ResultArray((count, m), np.int8),
-            ResultArray((count, 2)),
-            ResultArray((count, self.free)),
-            ResultArray((count,), np.int8),
+            NewArray((self.rows, count, m)),
+            NewArray((count, m), np.int8),
+            NewArray((count, 2)),
+            NewArray((count, self.free)),
+            NewArray((count,), np.int8),
         )
-        work = Work((m,), np.float64), self.memory
+        work = NewArray((m,), is_result=False), self.memory
         results, *_ = self.call(
             inverse_poses, self.model, method, self.limits, *given, *work, None, False, found, 0, count
         )
@@ -325,7 +320,7 @@ class InverseKinematics(Kinematics):
         found = self.call(
             *(distribution.sensitivities_of_lengths, self.terms, self.limits, self.robots(frame, platform), pose),
             *(results.swapaxes(0, 1), goal, self.memory, self.states(count)),
-            ResultArray((count, m, distribution.LENGTH_COLUMNS * m + 6)),
+            NewArray((count, m, distribution.LENGTH_COLUMNS * m + 6)),
         )
         levers, slopes, by_inputs = found[3], found[5], found[6]
         turn, rates = self.rotation(pose[:, 3:]), 2.0 * self.rates(pose[:, 3:]).swapaxes(1, 2)

@@ -10,12 +10,10 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import instance, whole_number
+from sagline.core.arguments import check_memory, instance, whole_number
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels import tables
 from sagline.kinematics.forward import checked_lengths, from_orientations, start_quaternions
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution, iterate_routing

@@ -11,12 +11,22 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import callback, optional
-from sagline.core.arrays import LARGEST, SMALLEST, Array, Flags, Indices, checked, locked, numbers
+from sagline.core.arguments import callback, check_poses, optional
+from sagline.core.arrays import (
+    LARGEST,
+    SMALLEST,
+    Array,
+    Flags,
+    Indices,
+    Progress,
+    blocks,
+    checked,
+    locked,
+    numbers,
+    rows_of,
+)
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, reduced, rule
-from sagline.core.memory import check_poses
-from sagline.core.progress import Progress, blocks, rows_of
 from sagline.core.results import Result
 from sagline.kernels import codes, tables
 from sagline.kinematics import forward_rows

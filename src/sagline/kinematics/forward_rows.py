@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, Codes, Flags, Indices, checked, locked
+from sagline.core.arrays import Array, Codes, Flags, Indices, Progress, blocks, checked, locked, rows_of
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress, blocks, rows_of
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels import codes, fit_poses, forward_poses, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.memory import memory_for

@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from sagline.core.arrays import Array, locked
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels import codes
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium

@@ -11,12 +11,10 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import brief, callback, choice, flag, instance
-from sagline.core.arrays import Array, Indices, exactly, locked, number
+from sagline.core.arguments import brief, callback, check_poses, choice, flag, instance
+from sagline.core.arrays import Array, Indices, Progress, exactly, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_poses
 from sagline.core.numbers import n
-from sagline.core.progress import Progress
 from sagline.kernels import codes
 from sagline.kinematics import inverse_rows
 from sagline.kinematics.forward_rows import Winding, checked_winding

@@ -9,9 +9,8 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.core.arguments import brief, choice, elements
-from sagline.core.arrays import Array, Codes, Flags, Indices, locked
+from sagline.core.arrays import Array, Codes, Flags, Indices, Progress, blocks, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress, blocks
 from sagline.kernels import (
     codes,
     decide_poses,

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from sagline.cables.model import CableStatus
 from sagline.core.arrays import Array, Codes, locked
-from sagline.core.results import Result, Saved
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Saved, Tabular
 from sagline.kernels import tables
 from sagline.kinematics.frame_forces import FrameForces, frame_forces_of
 from sagline.kinematics.inverse_rows import solve_inverse_rows

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, locked
 from sagline.core.numbers import n
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 

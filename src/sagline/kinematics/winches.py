@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.cable import Creep
-from sagline.core.arguments import choice, instance, optional
+from sagline.core.arguments import choice, instance, optional, true_runs
 from sagline.core.arrays import Array, Flags, kernel_input, locked, numbers
 from sagline.core.errors import InvalidValueError
-from sagline.core.indices import true_runs
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory
 from sagline.kinematics.plan import Plan
 from sagline.robot.drum import Drums, drum_tension, warmth

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced
-from sagline.core.results import Shown, set_fields
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Shown, Tabular, set_fields
 from sagline.robot.pose import Pose, PoseLike, pose_of
 
 

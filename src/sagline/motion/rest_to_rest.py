@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sagline.core.arguments import check_memory
 from sagline.core.arrays import Array, Flags, checked, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.motion.path import Path
 from sagline.robot.pose import Pose, PoseLike, pose_of
 

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sagline.calibration.result import Calibration
-from sagline.core.indices import true_runs
+from sagline.core.arguments import true_runs
 from sagline.dynamics.simulation.results import Simulation
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan

@@ -12,8 +12,8 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance, whole_number
+from sagline.core.arrays import Progress
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress
 from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.folder import open_record
 from sagline.optimization.free import Free

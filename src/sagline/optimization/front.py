@@ -9,11 +9,9 @@ from typing import Final
 import numpy as np
 
 from sagline.core.arguments import file_path
-from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, Progress, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress
-from sagline.core.results import Result
-from sagline.core.table import csv_text
+from sagline.core.results import Result, csv_text
 from sagline.files.robot_file import dump_robot
 from sagline.files.writing import atomic_files, create_folder, file_stem
 from sagline.optimization.candidates import Candidates

@@ -11,12 +11,10 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import callback, instance, optional
-from sagline.core.arrays import Array, Flags, locked
+from sagline.core.arrays import Array, Flags, Progress, blocks, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted, n
-from sagline.core.progress import Progress, blocks
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.batch import largest_sags
 from sagline.kernels.inverse.poses import inverse_poses

@@ -12,8 +12,8 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from PIL import Image
 
 from sagline.core.arguments import callback, file_path, instance, whole_number
+from sagline.core.arrays import Progress
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.core.progress import Progress
 from sagline.dynamics.vibration.vibration import WITH_MASS, ListedMode, Vibration, listed_modes
 from sagline.files.writing import atomic_file
 from sagline.plot.robot import fit_space, platform_box

@@ -8,10 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sagline.core.arguments import HOW_TO_GET, choice, instance
+from sagline.core.arguments import HOW_TO_GET, choice, evenly_spaced, instance, true_runs
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.core.indices import evenly_spaced, true_runs
 from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan

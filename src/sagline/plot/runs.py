@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from sagline.control.execution import Execution, null_space_error, position_error
 from sagline.control.recording import EventKind
 from sagline.control.states import State
-from sagline.core.arguments import instance
+from sagline.core.arguments import instance, true_runs
 from sagline.core.arrays import Array
-from sagline.core.indices import true_runs
 from sagline.core.numbers import ROUNDING, n, prefixed_unit
 from sagline.dynamics.simulation.results import Simulation
 from sagline.plot import sheet

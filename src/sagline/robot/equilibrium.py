@@ -11,12 +11,10 @@ from typing import Any, ClassVar, Concatenate, Final, ParamSpec, Protocol, TypeV
 import numpy as np
 
 from sagline.cables.model import CableModel, CableState
-from sagline.core.arguments import instance
+from sagline.core.arguments import batch_length, instance, part_of
 from sagline.core.arrays import Array, Codes, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.indices import batch_length, part_of
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels import tables
 from sagline.robot import batch
 from sagline.robot.batch import Index, Robots

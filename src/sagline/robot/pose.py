@@ -11,12 +11,10 @@ import numpy as np
 from attrs import field, fields, frozen
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arguments import instance
+from sagline.core.arguments import batch_length, check_memory, instance, part_of
 from sagline.core.arrays import Array, broadcast_shape, checked, locked, number, refuse_first
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, reduced, rule
-from sagline.core.indices import batch_length, part_of
-from sagline.core.memory import check_memory
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -8,11 +8,10 @@ import numpy as np
 from attrs import Attribute, evolve, field, fields_dict, frozen
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arguments import choice, whole_number
+from sagline.core.arguments import check_memory, choice, whole_number
 from sagline.core.arrays import SMALLEST, Array, Flags, checked, locked, refuse_first, spread
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
-from sagline.core.memory import check_memory
 from sagline.robot.pose import unit
 
 UPRIGHT: Final = 1e-9  # sine of the largest angle between a swivel axis and the vertical

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sagline.core.arrays import Array, Indices
-from sagline.core.progress import blocks, rows_of
+from sagline.core.arrays import Array, Indices, blocks, rows_of
 from sagline.kernels import tables
 from sagline.kernels.cable import swivel
 from sagline.kernels.forward import sensitivity

@@ -8,10 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from sagline.core.arguments import check_memory
 from sagline.core.arrays import Array, Flags, locked
-from sagline.core.memory import check_memory
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels.cable import swivel
 from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for

@@ -12,11 +12,9 @@ from typing import IO, TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.core.arguments import brief, choice, file_path
+from sagline.core.arguments import brief, check_memory, choice, file_path, part_of
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.core.indices import part_of
-from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
 from sagline.core.results import Result
 from sagline.files.variables import PARTS

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from sagline.core.arguments import brief, callback, file_path, instance, whole_number
+from sagline.core.arrays import Progress
 from sagline.core.errors import FileError, InvalidValueError, SaglineError
-from sagline.core.progress import Progress
 from sagline.sweep.folder import (
     SweepFolder,
     check_made_here,

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.core.arguments import instance
-from sagline.core.arrays import Array, locked
-from sagline.core.progress import blocks, rows_of
+from sagline.core.arrays import Array, blocks, locked, rows_of
 from sagline.kernels.inverse.feasibility import margins_of_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import first_of, robot_fields

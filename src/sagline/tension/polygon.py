@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 
 
 class Side(NamedTuple):

@@ -7,11 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.core.arrays import Array
+from sagline.core.arguments import evenly_spaced
+from sagline.core.arrays import Array, Progress
 from sagline.core.errors import InvalidValueError
-from sagline.core.indices import evenly_spaced
 from sagline.core.numbers import n
-from sagline.core.progress import Progress
 from sagline.dynamics.simulation.results import Occurrence, Simulation
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.plan import Plan

@@ -12,8 +12,8 @@ import numpy as np
 
 from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
+from sagline.core.arguments import evenly_spaced
 from sagline.core.arrays import Array, Codes
-from sagline.core.indices import evenly_spaced
 from sagline.core.numbers import n
 from sagline.files.execution_file import plan_of_log
 from sagline.files.mcap_layout import NANO

@@ -9,8 +9,8 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from sagline.core.arguments import true_runs
 from sagline.core.arrays import Array, Flags
-from sagline.core.indices import true_runs
 from sagline.robot.robot import Robot
 from sagline.viewer.tension_scale import cables_text, force_unit
 

@@ -9,9 +9,8 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, Indices, blocks, locked
 from sagline.core.numbers import n
-from sagline.core.progress import blocks
 from sagline.core.results import Result
 from sagline.kernels import codes
 from sagline.kinematics.inverse import inverse

@@ -11,14 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import callback
-from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
+from sagline.core.arguments import callback, check_memory
+from sagline.core.arrays import Array, Codes, Flags, Indices, Progress, blocks, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.core.numbers import counted, n
-from sagline.core.progress import Progress, blocks
-from sagline.core.results import Result, Status
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Status, Tabular
 from sagline.kernels import codes, tables
 from sagline.kernels.memory import memory_for
 from sagline.kernels.workspaces.signed_margin import margin_memory, signed_margins

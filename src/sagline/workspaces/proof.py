@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import callback, instance
-from sagline.core.arrays import Array, Codes, Indices, locked, number
+from sagline.core.arrays import Array, Codes, Indices, Progress, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
-from sagline.core.progress import Progress
 from sagline.core.results import Result, Status
 from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN, OUTSIDE, memory_for_proofs, prove_boxes
 from sagline.robot.pose import PoseBox

@@ -12,10 +12,9 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import brief, callback, choice, instance, whole_number
-from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
+from sagline.core.arrays import Array, Codes, Flags, Indices, Progress, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import SPACE, counted, n
-from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved, formats
 from sagline.kinematics.inverse_rows import Given
 from sagline.robot.pose import Pose, PoseBox

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from sagline.core.arguments import check_memory
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.dynamics.simulation.initial_conditions import InitialConditions
 from sagline.dynamics.simulation.results import EnergyBalance, Simulation, displaced_pose, twist_of_origin
 from sagline.dynamics.vibration.dynamic_stiffness import Damping

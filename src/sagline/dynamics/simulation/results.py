@@ -12,8 +12,7 @@ from sagline.core.arguments import brief, elements
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
-from sagline.core.results import Result, Saved
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Saved, Tabular
 from sagline.dynamics.simulation.winches import Winches
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.motion.anchors import AnchorMotion

@@ -8,10 +8,9 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from sagline.core.arguments import choice, optional, whole_number
+from sagline.core.arguments import check_memory, choice, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.dynamics.simulation.chain_plant import FEWEST, MOST, ChainPlant
 from sagline.dynamics.simulation.initial_conditions import InitialConditions, TableInTime, TimeTable, initial_conditions
 from sagline.dynamics.simulation.modal import modal_simulation

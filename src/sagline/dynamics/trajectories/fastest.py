@@ -8,9 +8,8 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from sagline.core.arguments import callback, instance
-from sagline.core.arrays import Array, number
+from sagline.core.arrays import Array, Progress, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress
 from sagline.dynamics.trajectories import profiles
 from sagline.dynamics.trajectories.segments import Curve, RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.kinematics.inverse import inverse

@@ -11,10 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import instance
+from sagline.core.arguments import check_memory, instance
 from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.core.results import Result, set_fields
 from sagline.dynamics.trajectories.segments import RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.motion.path import Path, checked_time

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arguments import optional
+from sagline.core.arguments import check_memory, optional
 from sagline.core.arrays import Array, Indices, checked, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.fields import NumberFields, rule
-from sagline.core.memory import check_memory
 from sagline.kernels import codes
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses

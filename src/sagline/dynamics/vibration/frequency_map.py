@@ -9,11 +9,9 @@ from typing import ClassVar, Final, TypeAlias
 import numpy as np
 
 from sagline.core.arguments import callback, instance, optional
-from sagline.core.arrays import Array, Codes, locked, number
+from sagline.core.arrays import Array, Codes, Progress, blocks, locked, number
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.core.progress import Progress, blocks
-from sagline.core.results import Result, Saved
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Saved, Tabular
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_model
 from sagline.dynamics.vibration.response import Receptance
 from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel

@@ -8,14 +8,10 @@ from typing import ClassVar, Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import choice, instance, optional
-from sagline.core.arrays import Array, checked, locked
+from sagline.core.arguments import check_memory, choice, evenly_spaced, instance, optional
+from sagline.core.arrays import Array, blocks, checked, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.indices import evenly_spaced
-from sagline.core.memory import check_memory
-from sagline.core.progress import blocks
-from sagline.core.results import Result
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Tabular
 from sagline.dynamics.vibration.component_modes import CableComponents, PlaneModes
 from sagline.dynamics.vibration.dynamic_stiffness import (
     Complex,

@@ -10,8 +10,7 @@ import numpy as np
 from sagline.core.arguments import brief, instance, optional
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import Result, Status
-from sagline.core.table import Columns, Tabular
+from sagline.core.results import Columns, Result, Status, Tabular
 from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model, single_state
 from sagline.dynamics.vibration.flexibility import stretch_losses

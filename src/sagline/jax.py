@@ -7,27 +7,27 @@ derivatives.
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from sagline.cables.model import CableModel
 from sagline.core.errors import InvalidValueError
-from sagline.jax.calls import ffi_call, register
-from sagline.kinematics.differentiable import (
-    CATENARY,
-    Forward,
-    ForwardKinematics,
-    HasPose,
-    Inverse,
-    InverseKinematics,
-    Kinematics,
-    Value,
-)
+from sagline.kernels.jit import VARIABLE, backend, compiled_library
+from sagline.kinematics.differentiable import CATENARY, ForwardKinematics, InverseKinematics, Kinematics, Value
+from sagline.kinematics.differentiable import Forward as Forward
+from sagline.kinematics.differentiable import HasPose as HasPose
+from sagline.kinematics.differentiable import Inverse as Inverse
+from sagline.kinematics.differentiable import NewArray as NewArray
 from sagline.robot.robot import Robot
+
+TARGET: Final = "sagline"
+LETTERS: Final = {"float64": "D", "int64": "L", "int8": "B"}
 
 
 def forward(
@@ -188,3 +188,53 @@ def _anchors(kinematics: Kinematics, frame: Value | None, platform: Value | None
         jnp.asarray(of_frame) if frame is None else _shaped(frame, "frame_anchors", (m, 3)),
         jnp.asarray(of_platform) if platform is None else _shaped(platform, "platform_anchors", (m, 3)),
     )
+
+
+@cache
+def register() -> None:
+    """Make the compiled kernels known to JAX. Refuse other back ends."""
+    if backend() != "c":
+        step = "Build the library of compiled kernels with `make env`, or install a wheel."
+        raise InvalidValueError(VARIABLE, backend(), "c for sagline.jax", step)
+    jax.ffi.register_ffi_target(TARGET, jax.ffi.pycapsule(compiled_library().xla), platform="cpu")
+
+
+def ffi_call(entry: Callable[..., object], *arguments: Any) -> list[Any]:
+    """Outputs of a kernel. Its arguments are numbers, None, arrays, and new arrays for work and output, in tuples."""
+    operands: list[Any] = []
+    results: list[Any] = []
+    numbers: list[float] = []
+    sizes: list[int] = []
+    plan: list[str] = []
+
+    def form(value: Any) -> str:
+        """Format of an argument, as the library declares it."""
+        if isinstance(value, tuple) and not isinstance(value, NewArray):
+            return f"({''.join(map(form, value))})"
+        if value is None:
+            return "N"
+        if isinstance(value, bool | int | float):
+            numbers.append(float(value))
+            return "?" if isinstance(value, bool) else "i" if isinstance(value, int) else "f"
+        if not isinstance(value, NewArray):
+            operands.append(value)
+            plan.append("a")
+        elif value.is_result:
+            results.append(jax.ShapeDtypeStruct(value.shape, value.dtype))
+            plan.append("r")
+        else:
+            sizes.extend(value.shape)
+            plan.append("s")
+        return f"{LETTERS[np.dtype(value.dtype).name]}{len(value.shape)}"
+
+    text = form(arguments)
+    call = jax.ffi.ffi_call(TARGET, results, vmap_method="expand_dims")
+    found: list[Any] = call(
+        *operands,
+        entry=entry.__name__,
+        format=text,
+        plan="".join(plan),
+        sizes=np.array(sizes, dtype=np.int64),
+        numbers=np.array(numbers, dtype=np.float64),
+    )
+    return found
