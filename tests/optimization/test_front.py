@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 
 import sagline as sl
-from sagline.optimization.front import PENALTY, costs_of, pareto_front
+from sagline.optimization.design import PENALTY, costs_of, pareto_front
 from tests.optimization.pair import UNDER, apart, pair
 from tests.tiers import extended
 

@@ -42,7 +42,7 @@ def design(
         sagline design own_robot.yaml design.yaml --out front \
             --evaluations 600
     """
-    from sagline.optimization.front import FRONT
+    from sagline.optimization.design import FRONT
     from sagline.optimization.request import MOST_EVALUATIONS
 
     first, request = sl.load_robot(robot), sl.load_design(file)

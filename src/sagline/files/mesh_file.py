@@ -114,7 +114,7 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
 
 def _first_crossing(mesh: Mesh) -> Array | None:
     """Point [m] where a surface crosses itself, or None. Triangles with a common edge or corner do not cross."""
-    from sagline.interference.meshed import package
+    from sagline.interference.pairs import package
 
     fcl = package()
     model = fcl.BVHModel()

@@ -54,7 +54,7 @@ class ClearanceRows:
         self._still = locked(np.array(still).reshape(-1, shapes.COLUMNS))
         self._meshed = None
         if len(self.pairs.with_mesh):
-            from sagline.interference.meshed import Meshed  # this class needs python-fcl
+            from sagline.interference.pairs import Meshed  # this class needs python-fcl
 
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 

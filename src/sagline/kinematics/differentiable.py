@@ -167,9 +167,7 @@ class Kinematics:
         self.limits = LIMITS_OF[robot.tension_limits_of], float("nan")
         self.weight = 0.0 if own.weightless else robot.cables.linear_density * robot.gravity
         self.rows = result_rows(robot)
-        self.memory = tuple(
-            NewArray(work.shape, work.dtype, is_result=False) for work in memory_for(robot.cable_count)
-        )
+        self.memory = tuple(NewArray(work.shape, work.dtype, is_result=False) for work in memory_for(robot.cable_count))
 
     def solve(self, *inputs: Value) -> tuple[Value, Value, Value]:
         """First result, tensions (N, m), and results of the kernels (N, rows, m)."""

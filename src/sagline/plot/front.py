@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array
-from sagline.optimization.front import Front
+from sagline.optimization.design import Front
 from sagline.optimization.request import Goal
 from sagline.plot.labels import name_lines, set_heading
 from sagline.plot.sheet import BLUE, GAP_COLOR, VERMILLION, format_axes, sheet

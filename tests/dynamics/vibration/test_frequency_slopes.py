@@ -8,7 +8,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.vibration.mode_sensitivities import _edges, _longest, _StringData
+from sagline.dynamics.vibration.frequency_slopes import _edges, _longest, _StringData
 from tests.dynamics.linear_systems import mass_of
 from tests.kinematics.feasible import feasible_plan
 from tests.refusal import refused

@@ -12,11 +12,11 @@ from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.tables import BODY_COLUMNS, CABLE_COLUMNS
-from sagline.kernels.workspaces import pose_box
-from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
+from sagline.kernels.workspaces import box_tensions
+from sagline.kernels.workspaces.box_tensions import MOTIONS, CablesInBox, PoseRange
 from tests.kernels.compiled import from_python
 
-set_place, geometry_of = from_python(pose_box.set_cables_in_box), from_python(cable_geometry)
+set_place, geometry_of = from_python(box_tensions.set_cables_in_box), from_python(cable_geometry)
 M = 8
 
 

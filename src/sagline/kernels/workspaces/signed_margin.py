@@ -29,28 +29,26 @@ from sagline.kernels.statics import Platform, fill_structure_matrix, is_rotation
 from sagline.kernels.workspaces import sag_force_bounds as sag
 from sagline.kernels.workspaces import wrench_set
 from sagline.kernels.workspaces.exact_margin import ABOVE, BELOW, VALUE, LimitingFacet, settle_margin
-from sagline.kernels.workspaces.facet_bounds import (
+from sagline.kernels.workspaces.facets import (
     ABOVE_SECANT,
     BELOW_SECANT,
     COLUMN,
     COUNT_ROWS,
+    DEPENDENT,
     LEVER_X,
     LEVER_Y,
-    WIDTH,
-    Bounds,
-    FacetWeights,
-    fill_bounds,
-    measure_bounds,
-    new_bounds,
-)
-from sagline.kernels.workspaces.facets import (
-    DEPENDENT,
     LIMIT,
     MEMBERS,
     ORDER,
     START,
+    WIDTH,
+    Bounds,
     Facets,
+    FacetWeights,
     choose_basis,
+    fill_bounds,
+    measure_bounds,
+    new_bounds,
     new_facets,
     next_subsets,
 )
