@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.massless import cable_loads
+from sagline.kernels.dynamics.motion import cable_loads
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS
 from sagline.kinematics.differentiable import InverseKinematics, pull_batch, solve_batch
 from sagline.robot.batch import has_routing

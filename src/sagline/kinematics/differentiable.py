@@ -83,7 +83,7 @@ class NewArray(NamedTuple):
     is_result: bool = True
 
 
-def call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
+def _call_kernel(entry: Callable[..., object], *arguments: Any) -> list[Any]:
     """Outputs of a kernel. Its arguments are numbers, None, arrays, and new arrays for work and output, in tuples."""
     outputs = []
 
@@ -148,7 +148,7 @@ class Kinematics:
         model: CableModel | str,
         function: str,
         numpy: ModuleType = np,
-        call: Callable[..., list[Any]] = call_kernel,
+        call: Callable[..., list[Any]] = _call_kernel,
     ) -> None:
         """Check the robot and the model. `function`: public name; `numpy`, `call`: those of the host."""
         own = model_of(model)

@@ -150,7 +150,7 @@ def pareto_front(costs: Array) -> Indices:
 LONGEST: Final = 80  # largest number of letters in a robot's name before its number
 
 
-class Ledger:
+class _Ledger:
     """Rating of candidates for an optimizer.
 
     With the same seed, an optimizer requests the same candidates again. Candidates in the record are not rated again. A
@@ -341,7 +341,7 @@ def design(
     if count < 2 * population:
         allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
         raise InvalidValueError("evaluations", f"{count:,}", allowed, "Give more evaluations, or fewer variables.")
-    ledger = Ledger(request, candidates, count, progress)  # raises errors before a file is written
+    ledger = _Ledger(request, candidates, count, progress)  # raises errors before a file is written
     sample = latin_hypercube(population - 1, dimensions, request.seed)
     first = np.concatenate((candidates.units(candidates.start[None]), sample))
     with nullcontext() if folder is None else open_record(folder, request) as ledger.record:

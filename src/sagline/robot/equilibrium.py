@@ -174,7 +174,7 @@ class HasState(Protocol):
         """Equilibrium that the result contains."""
 
 
-class OfEquilibrium(Protocol[_P, _R_co]):
+class _OfEquilibrium(Protocol[_P, _R_co]):
     """Function that accepts an equilibrium, a result that contains one, or a robot with a pose."""
 
     @overload
@@ -192,7 +192,7 @@ def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state"
     return state if isinstance(state, Equilibrium) else instance(start, Equilibrium, item)
 
 
-def of_result(function: Callable[Concatenate[Equilibrium | HasState, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
+def of_result(function: Callable[Concatenate[Equilibrium | HasState, _P], _R_co]) -> _OfEquilibrium[_P, _R_co]:
     """Decorator: the function accepts a robot and a pose in place of an equilibrium or result."""
 
     @wraps(function)
@@ -205,7 +205,7 @@ def of_result(function: Callable[Concatenate[Equilibrium | HasState, _P], _R_co]
     return call
 
 
-def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
+def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> _OfEquilibrium[_P, _R_co]:
     """Decorator: the function accepts a result, or a robot and a pose, in place of an equilibrium."""
 
     @wraps(function)

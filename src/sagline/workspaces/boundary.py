@@ -28,14 +28,7 @@ from sagline.workspaces.grid import (
 )
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region
-from sagline.workspaces.surface import (
-    Components,
-    Surface,
-    labels_of,
-    normals_of,
-    vertex_areas,
-    volumes_of,
-)
+from sagline.workspaces.surface import Components, Surface, labels_of, normals_of, vertex_areas, volumes_of
 
 MOST_CELLS: Final = 128  # along an axis
 MOST_HALVED: Final = 256  # largest number of cells along an axis; this gives 17 million nodes, 0.5 GB

@@ -20,7 +20,7 @@ from sagline.dynamics.simulation.run import SimulationRun
 from sagline.dynamics.simulation.winches import Winches, Winding, checked_winding, drive_data, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics import massless as k
+from sagline.kernels.dynamics import motion as k
 from sagline.kinematics.plan import Plan
 from sagline.motion.anchors import AnchorMotion
 from sagline.robot.equilibrium import Equilibrium, HasState

@@ -21,7 +21,7 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
-from sagline.kernels.dynamics.massless import LOADED
+from sagline.kernels.dynamics.motion import LOADED
 from sagline.kernels.dynamics.progress import begin_period
 from sagline.kernels.jit import bound
 from sagline.kinematics.inverse_solver import copy_in

@@ -75,12 +75,6 @@ def _frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Fram
 
 
 @formula
-def in_world_axes(rows: Array, i: int, along: float, up: float) -> tuple[float, float, float]:
-    """Derivatives with respect to the platform-end force, converted to world axes."""
-    return along * rows[g.AZIMUTH_X, i], along * rows[g.AZIMUTH_Y, i], up
-
-
-@formula
 def cross(a: Triple, b: Triple) -> Triple:
     """Cross product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -263,7 +257,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
             space.shares[i, 3], space.shares[i, 4] = 0.0, space.rows[g.LEAVING, i]
             continue
         by = _frame_end_slopes(model, cables, space.rows, i)
-        x, y, z = in_world_axes(space.rows, i, by.along, by.up)
+        x, y, z = _in_world_axes(space.rows, i, PlaneVector(by.along, by.up))
         space.shares[i, 0], space.shares[i, 1], space.shares[i, 2] = x, y, z
         space.shares[i, 3], space.shares[i, 4] = by.by_height, by.tension
 

@@ -13,18 +13,9 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes
+from sagline.kernels.algebra import programs
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound, most_violated_bound
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.programs import (
-    LP_GAVE_UP,
-    LP_SOLVED,
-    LP_UNBOUNDED,
-    ActiveSet,
-    Basis,
-    lowest_point,
-    nearest_point,
-    new_active_set,
-)
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 
@@ -44,7 +35,7 @@ class ReferencePoint(NamedTuple):
 
     previous: Array  # reference tensions in the distribution's variable (m,), NaN without a reference
     reference: Array  # lambda_ref, (r,)
-    held: ActiveSet  # active limits of the last projection
+    held: programs.ActiveSet  # active limits of the last projection
     point: Array  # result of the last projection, (r,)
 
 
@@ -52,7 +43,7 @@ class ReferencePoint(NamedTuple):
 def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[ReferencePoint, Memory]:
     """Work arrays for r redundant cables, and the remaining memory."""
     rows, memory = block(memory, 2, r)
-    held, memory = new_active_set(memory, r)
+    held, memory = programs.new_active_set(memory, r)
     return ReferencePoint(previous, rows[0], held, rows[1]), memory
 
 
@@ -97,7 +88,7 @@ def share_nearest(bounds: Array, null: Array, near: ReferencePoint, tension: Arr
     slack = TOLERANCE * largest_bound(bounds)
     if null.shape[0] == 0:
         return codes.POSE_SOLVED if satisfies_limits(bounds, tension, slack) else codes.POSE_INFEASIBLE
-    if not nearest_point(null, bounds, near.reference, slack, near.held, near.point):
+    if not programs.nearest_point(null, bounds, near.reference, slack, near.held, near.point):
         return codes.POSE_INFEASIBLE
     set_point(bounds, null, near.point, tension)
     return codes.POSE_SOLVED
@@ -115,15 +106,15 @@ TIED = 1e-10  # sums with a smaller relative difference count as equal; a smalle
 @formula
 def program_status(outcome: int) -> int:
     """Status of the pose that belongs to the outcome of a linear program."""
-    if outcome == LP_SOLVED:
+    if outcome == programs.LP_SOLVED:
         return codes.POSE_SOLVED
-    if outcome == LP_UNBOUNDED:
+    if outcome == programs.LP_UNBOUNDED:
         return codes.POSE_UNBOUNDED
-    return codes.POSE_NOT_CONVERGED if outcome == LP_GAVE_UP else codes.POSE_INFEASIBLE
+    return codes.POSE_NOT_CONVERGED if outcome == programs.LP_GAVE_UP else codes.POSE_INFEASIBLE
 
 
 @formula
-def _is_tied(basis: Basis) -> bool:
+def _is_tied(basis: programs.Basis) -> bool:
     """True if a linear program has more than one optimum, which means that an active bound has a multiplier of zero."""
     largest = 0.0
     least = math.inf
@@ -134,7 +125,7 @@ def _is_tied(basis: Basis) -> bool:
 
 
 @kernel
-def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory) -> int:
+def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: programs.Basis, memory: Memory) -> int:
     """Fill `near.point` (r,) with the null-space point whose tensions have the least sum."""
     # If several points have the least sum, the point nearest to the reference is selected.
     r, m = null.shape
@@ -143,8 +134,8 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
         cost[k] = 0.0
         for i in range(m):
             cost[k] += null[k, i]
-    outcome = lowest_point(null, bounds, cost, 0.0, basis, near.point)
-    if outcome != LP_SOLVED:
+    outcome = programs.lowest_point(null, bounds, cost, 0.0, basis, near.point)
+    if outcome != programs.LP_SOLVED:
         basis.labels[0] = -1
         return program_status(outcome)
     if not _is_tied(basis):
@@ -163,7 +154,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
             tied[row, i] = bounds[row, i]
     largest = largest_bound(bounds)
     tied[START, m], tied[LOW, m], tied[HIGH, m] = 0.0, -math.inf, least + TIED * largest
-    if nearest_point(rows, tied, near.reference, TOLERANCE * largest, near.held, found):
+    if programs.nearest_point(rows, tied, near.reference, TOLERANCE * largest, near.held, found):
         for k in range(r):
             near.point[k] = found[k]
     return codes.POSE_SOLVED
@@ -171,7 +162,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 
 @kernel
 def share_lowest_maximum(
-    bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
+    bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: programs.Basis, memory: Memory
 ) -> int:
     """Fill the point (r,) of `near` with the least maximum tension; of several points, the nearest to the reference."""
     # The program's last unknown is the largest tension.
@@ -194,8 +185,8 @@ def share_lowest_maximum(
     cost[:r] = 0.0
     cost[r] = 1.0
     largest = largest_bound(bounds)
-    outcome = lowest_point(rows, wide, cost, TOLERANCE * largest, basis, found)
-    if outcome != LP_SOLVED:
+    outcome = programs.lowest_point(rows, wide, cost, TOLERANCE * largest, basis, found)
+    if outcome != programs.LP_SOLVED:
         basis.labels[0] = -1
         return codes.POSE_INFEASIBLE if program_status(outcome) == codes.POSE_INFEASIBLE else codes.POSE_NOT_CONVERGED
     for k in range(r):
@@ -207,7 +198,7 @@ def share_lowest_maximum(
             lower[row, i] = bounds[row, i]
         highest = found[r] - offset[i] + 4.0 * TOLERANCE * largest
         lower[HIGH, i] = max(min(bounds[HIGH, i], highest), bounds[LOW, i])
-    if nearest_point(null, lower, near.reference, TOLERANCE * largest, near.held, nearest):
+    if programs.nearest_point(null, lower, near.reference, TOLERANCE * largest, near.held, nearest):
         for k in range(r):
             near.point[k] = nearest[k]
     return codes.POSE_SOLVED
@@ -231,12 +222,12 @@ def share_by_norm(
         last, _ = vector(memory, point.size)
         for k in range(point.size):
             last[k] = point[k]
-        kept = nearest_point(null, bounds, last, slack, near.held, point)
+        kept = programs.nearest_point(null, bounds, last, slack, near.held, point)
         if kept and _lowest_p_norm(p, p, bounds, offset, null, near, memory):
             return codes.POSE_SOLVED
     known[0] = 0
     near.held.labels[0] = 0
-    if not nearest_point(null, bounds, near.reference, slack, near.held, point):
+    if not programs.nearest_point(null, bounds, near.reference, slack, near.held, point):
         return codes.POSE_INFEASIBLE
     if not _lowest_p_norm(min(4.0, p), p, bounds, offset, null, near, memory):
         return codes.POSE_NOT_CONVERGED
@@ -336,7 +327,7 @@ def _lowest_p_norm(
             return True
         if most_violated_bound(null, bounds, target, 0.0, True) >= 0:
             _change_metric(null, curve, target, turned, goal)
-            if not nearest_point(turned, bounds, goal, slack * max(curve[0, 0], 1.0), near.held, target):
+            if not programs.nearest_point(turned, bounds, goal, slack * max(curve[0, 0], 1.0), near.held, target):
                 return False
             solve_upper(curve, target)
             for k in range(r):

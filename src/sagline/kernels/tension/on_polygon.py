@@ -19,14 +19,8 @@ from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, box_radius, largest_bound, most_violated_bound
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block, counters
+from sagline.kernels.tension import polygon
 from sagline.kernels.tension.nearest import ReferencePoint
-from sagline.kernels.tension.polygon import (
-    WorkArrays,
-    feasible_polygon,
-    nearest_corner_point,
-    nearest_on_side,
-    polygon_again,
-)
 
 PARALLEL = 1e-12
 
@@ -129,13 +123,13 @@ TIED = 1e-10  # sums that differ by less, relative to the largest tension, count
 
 @kernel
 def distribute_on_polygon(
-    method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
+    method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: polygon.WorkArrays
 ) -> int:
     """Fill the point (r,) of `near` by centroid or polygon walk. First, the sides of the last polygon are tried."""
     r, m = null.shape
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
-    if count == 0 or not polygon_again(bounds, null, corners, labels, count):
+    if count == 0 or not polygon.polygon_again(bounds, null, corners, labels, count):
         if method == codes.POLYGON_WALK and r == 2:
             count = walk_polygon(bounds, null, work.rest, corners, labels)
         else:
@@ -150,7 +144,7 @@ def distribute_on_polygon(
         x, y = lowest_corner(bounds, null, corners, count, x, y)
     elif method == codes.POLYGON_WALK and parameter == codes.WALK_NORM:
         if most_violated_bound(null, bounds, reference, 0.0, True) >= 0:
-            x, y = nearest_corner_point(corners, count, x, y)
+            x, y = polygon.nearest_corner_point(corners, count, x, y)
     else:
         for k in range(count):
             if labels[k] >= 2 * m:
@@ -191,7 +185,7 @@ def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices
     """Fill the corners of the feasible polygon, or for r = 1 the interval's ends. Returns their number, 0 if empty."""
     # The edge of the box around the polygon replaces an infinite end of the interval, with the label of the box.
     if null.shape[0] == 2:
-        return feasible_polygon(bounds, null, corners, labels)
+        return polygon.feasible_polygon(bounds, null, corners, labels)
     first, last = feasible_interval(bounds, null)
     if first > last:
         return 0
@@ -255,7 +249,7 @@ def lowest_corner(
         if gx * corners[k, 0] + gy * corners[k, 1] <= tie:
             x, y = corners[k, 0], corners[k, 1]
             if gx * corners[following, 0] + gy * corners[following, 1] <= tie:
-                x, y = nearest_on_side(x, y, corners[following, 0], corners[following, 1], goal_x, goal_y)
+                x, y = polygon.nearest_on_side(x, y, corners[following, 0], corners[following, 1], goal_x, goal_y)
             distance = (x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y)
             if distance < best:
                 best = distance

@@ -192,14 +192,14 @@ def _add_column(facets: Facets, n: int, size: int, column: int, count: int, firs
         rows = ORDER[n, s]
         m0, m1, m2 = minors[FEWER[rows, 0]], minors[FEWER[rows, 1]], minors[FEWER[rows, 2]]
         m3, m4, m5 = minors[FEWER[rows, 3]], minors[FEWER[rows, 4]], minors[FEWER[rows, 5]]
-        c0, c1, c2, c3, c4, c5 = signed_entries(rows, facets.others[column])
+        c0, c1, c2, c3, c4, c5 = _signed_entries(rows, facets.others[column])
         out = minors[rows, first:]
         for c in range(count):
             out[c] = c0 * m0[c] + c1 * m1[c] + c2 * m2[c] + c3 * m3[c] + c4 * m4[c] + c5 * m5[c]
 
 
 @formula
-def signed_entries(rows: int, column: Array) -> tuple[float, float, float, float, float, float]:
+def _signed_entries(rows: int, column: Array) -> tuple[float, float, float, float, float, float]:
     """Entries of a column in `rows`, with the signs of Laplace's expansion; the last ones are zero."""
     return (
         SIGNS[rows, 0] * column[MEMBERS[rows, 0]], SIGNS[rows, 1] * column[MEMBERS[rows, 1]],
@@ -348,7 +348,7 @@ def measure_bounds(minors: Array, rows: int, members: int, count: int, limit: fl
     m0, m1, m2 = minors[FEWER[rows, 0]], minors[FEWER[rows, 1]], minors[FEWER[rows, 2]]
     m3, m4, m5 = minors[FEWER[rows, 3]], minors[FEWER[rows, 4]], minors[FEWER[rows, 5]]
     for t in range(bounds.first, terms.shape[0]):
-        c0, c1, c2, c3, c4, c5 = signed_entries(rows, terms[t])
+        c0, c1, c2, c3, c4, c5 = _signed_entries(rows, terms[t])
         weight = terms[t, WEIGHT]
         for c in range(count):
             along = c0 * m0[c] + c1 * m1[c] + c2 * m2[c] + c3 * m3[c] + c4 * m4[c] + c5 * m5[c]

@@ -81,7 +81,7 @@ def _new_tension_box(memory: Memory, m: int, n: int) -> tuple[_TensionBox, Memor
 
 
 @kernel
-def proves_inside(
+def _proves_inside(
     place: CablesInBox,
     box: PoseRange,
     curves: Curves,
@@ -244,7 +244,7 @@ GIVE, WORK = 0, 7  # weights of the cables, and a work row
 
 
 @kernel
-def proves_outside(
+def _proves_outside(
     place: CablesInBox,
     box: PoseRange,
     curves: Curves,
@@ -536,7 +536,7 @@ def prove_boxes(
         outside = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
         beyond = outside  # of the last search, whose limits the set of wrenches narrows
         for _ in range(0 if outside else ATTEMPTS if several else 1):
-            if proves_inside(place, box, curves, loads, centered, ranges, precision, rest):
+            if _proves_inside(place, box, curves, loads, centered, ranges, precision, rest):
                 verdicts[p] = INSIDE
                 break
             if beyond:
@@ -551,7 +551,7 @@ def prove_boxes(
             taken[:] = 0.0
             box_tensions.search_limits(ranges, taken, size, centered)
             outside = box_tensions.center_tensions(place, curves, geometry, body, wrench, centered, ranges)
-        if outside and proves_outside(place, box, curves, centered, ranges, precision, rest):
+        if outside and _proves_outside(place, box, curves, centered, ranges, precision, rest):
             verdicts[p] = OUTSIDE
 
 

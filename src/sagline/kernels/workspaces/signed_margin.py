@@ -19,39 +19,16 @@ from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
-from sagline.kernels.cable.sag_forces import new_curves
+from sagline.kernels.cable.sag_forces import Curves, new_curves
 from sagline.kernels.cable.states import TensionLimits, cable_without_tension, least_of_sag
 from sagline.kernels.cable.terms import new_cables
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_at
 from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import Platform, fill_structure_matrix, is_rotation, place_cables, rows_along_freedom
+from sagline.kernels.workspaces import facets, wrench_set
 from sagline.kernels.workspaces import sag_force_bounds as sag
-from sagline.kernels.workspaces import wrench_set
 from sagline.kernels.workspaces.exact_margin import ABOVE, BELOW, VALUE, LimitingFacet, settle_margin
-from sagline.kernels.workspaces.facets import (
-    ABOVE_SECANT,
-    BELOW_SECANT,
-    COLUMN,
-    COUNT_ROWS,
-    DEPENDENT,
-    LEVER_X,
-    LEVER_Y,
-    LIMIT,
-    MEMBERS,
-    ORDER,
-    START,
-    WIDTH,
-    Bounds,
-    Facets,
-    FacetWeights,
-    choose_basis,
-    fill_bounds,
-    measure_bounds,
-    new_bounds,
-    new_facets,
-    next_subsets,
-)
 
 # rounding error of the product of a normal with a column in its facet, relative to the terms of the product
 ALONG = 1e-13
@@ -122,66 +99,98 @@ def signed_margins(
     inertias = set_terms[7]
     count, m, n = poses.shape[0], robots.shape[1], freedom.shape[0]
     cables, rest = new_cables(Memory(memory[0], memory[1]), m, robots_have_machine(robots))
-    facets, rest = new_facets(rest, n, m)
-    bounds, rest = new_bounds(rest, n, m)
+    walk, rest = facets.new_facets(rest, n, m)
+    bounds, rest = facets.new_bounds(rest, n, m)
     wrenches, rest = wrench_set.new_set(set_terms, rest)
     rotation, rest = block(rest, 3, 3)
     found, rest = vector(rest, 3)
     middle, rest = vector(rest, 6)
     wrench, rest = vector(rest, 6)
     measured, rest = vector(rest, FACET_SIZE)
-    rows, rest = block(rest, g.GEOMETRY_ROWS + sag.BAND_ROWS + COUNT_ROWS, m)
+    rows, rest = block(rest, g.GEOMETRY_ROWS + sag.BAND_ROWS + facets.COUNT_ROWS, m)
     geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + sag.BAND_ROWS]
     counted = rows[g.GEOMETRY_ROWS + sag.BAND_ROWS :]
     for p in range(first, last):
         values[VALUE, p] = values[BELOW, p] = values[ABOVE, p] = -math.inf
-        limiting[p] = -1
         directions[p] = 0.0
         body, robot = bodies[p * bodies.shape[0] // count], robots[p * robots.shape[0] // count]
-        model = model_at(model_terms, body)
-        cable_geometry(robot, body, poses[p], rotation, geometry)
-        if not place_cables(model, limits, robot, geometry, cables):
-            statuses[p] = codes.MARGIN_NO_CHORD
-            continue
-        fill_structure_matrix(geometry, counted[COLUMN:])
-        lever = arms[1][p * arms[1].size // count]
-        _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
-        straight = model.code == codes.STRAIGHT
-        if not choose_basis(facets, n, m, lever, straight):
-            statuses[p] = codes.MARGIN_SINGULAR
-            continue
-        curves, left = new_curves(model, cables, memory[2], rest)
-        limiting[p] = cable_without_tension(cables)
-        if limiting[p] >= 0:
-            slack = cables.high[limiting[p]] < least_of_sag(model, cables.half_weight[limiting[p]])
-            statuses[p] = codes.MARGIN_TOO_SLACK if slack else codes.MARGIN_INFEASIBLE
-            continue
-        if not sag.fill_bands(curves, bands, left):
-            statuses[p] = codes.MARGIN_TOO_SLACK
+        arm, lever = arms[0][p * arms[0].size // count], arms[1][p * arms[1].size // count]
+        platform = Platform(freedom, body, robot, poses[p], wrench)
+        curves, left = new_curves(model_at(model_terms, body), cables, memory[2], rest)
+        statuses[p], limiting[p] = _set_pose(
+            limits, platform, lever, curves, walk, rotation, geometry, bands, counted[facets.COLUMN :], left
+        )
+        if statuses[p] != codes.MARGIN_OPEN:
             continue
         wrench_set.place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
-        endless, curved = _fill_weights(body, set_terms[0], geometry, bands, counted, middle)
-        if not straight:
-            _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
-            choose_basis(facets, n, m, lever, True)
-        counts = FacetWeights(
-            counted, middle, bands[sag.HIGH], endless, curved, arms[0][p * arms[0].size // count], lever
-        )
-        _measure_all_facets(facets, bounds, m, counts, wrenches, measured, found, directions[p])
+        counts = _facet_weights(body, set_terms[0], geometry, bands, counted, middle, arm, lever)
+        if curves.model.code != codes.STRAIGHT:
+            _fill_facet_table(freedom, counted[facets.COLUMN :], lever, walk.table)
+            facets.choose_basis(walk, n, m, lever, True)
+        _measure_all_facets(walk, bounds, m, counts, wrenches, measured, found, directions[p])
         limiting[p] = _limiting_cable(counts, directions[p]) if found[VALUE] < math.inf else -1
         statuses[p] = _margin_status(found)
-        if curved and statuses[p] == codes.MARGIN_OPEN:
-            single = wrench_set.worst_wrench(set_terms[0], wrenches, directions[p], wrench)
-            for k in range(6):
-                middle[k] -= set_terms[0][k]
-            facet = LimitingFacet(
-                directions[p], counted[COLUMN:], counted[WIDTH], counted[LEVER_X : LEVER_Y + 1], middle, bands,
-                counts.arm, single,
-            )  # fmt: skip
-            platform = Platform(freedom, body, robot, poses[p], wrench)
-            statuses[p] = settle_margin(model, limits, platform, facet, curves, found, left)
+        if counts.curved and statuses[p] == codes.MARGIN_OPEN:
+            statuses[p] = _settle_sign(
+                limits, platform, curves, counts, bands, wrenches, set_terms[0], directions[p], found, left
+            )
         for k in range(3):
             values[k, p] = found[k]
+
+
+@glue
+def _set_pose(
+    limits: TensionLimits,
+    platform: Platform,
+    lever: float,
+    curves: Curves,
+    walk: facets.Facets,
+    rotation: Array,
+    geometry: Array,
+    bands: Array,
+    columns: Array,
+    memory: Memory,
+) -> tuple[int, int]:
+    """Fill geometry, structure matrix, basis and bands. Returns a status, and a cable without tensions, or -1."""
+    # `columns`: filled with the structure matrix, (6, m). The status is MARGIN_OPEN if the pose can be measured.
+    model, cables = curves.model, curves.cables
+    cable_geometry(platform.robot, platform.body, platform.pose, rotation, geometry)
+    if not place_cables(model, limits, platform.robot, geometry, cables):
+        return codes.MARGIN_NO_CHORD, -1
+    fill_structure_matrix(geometry, columns)
+    _fill_facet_table(platform.freedom, columns, lever, walk.table)
+    if not facets.choose_basis(walk, walk.basis.size, cables.low.size, lever, model.code == codes.STRAIGHT):
+        return codes.MARGIN_SINGULAR, -1
+    i = cable_without_tension(cables)
+    if i >= 0:
+        slack = cables.high[i] < least_of_sag(model, cables.half_weight[i])
+        return codes.MARGIN_TOO_SLACK if slack else codes.MARGIN_INFEASIBLE, i
+    return codes.MARGIN_OPEN if sag.fill_bands(curves, bands, memory) else codes.MARGIN_TOO_SLACK, -1
+
+
+@glue
+def _settle_sign(
+    limits: TensionLimits,
+    platform: Platform,
+    curves: Curves,
+    counts: facets.FacetWeights,
+    bands: Array,
+    wrenches: wrench_set.WrenchSetArrays,
+    center: Array,
+    direction: Array,
+    margin: Array,
+    memory: Memory,
+) -> int:
+    """Replace `margin` (3,) by the margin with exact sag forces. Returns its status."""
+    rows = counts.rows
+    single = wrench_set.worst_wrench(center, wrenches, direction, platform.wrench)
+    for k in range(6):
+        counts.middle[k] -= center[k]
+    levers = rows[facets.LEVER_X : facets.LEVER_Y + 1]
+    facet = LimitingFacet(
+        direction, rows[facets.COLUMN :], rows[facets.WIDTH], levers, counts.middle, bands, counts.arm, single
+    )
+    return settle_margin(curves.model, limits, platform, facet, curves, margin, memory)
 
 
 @glue
@@ -199,11 +208,10 @@ def _fill_facet_table(freedom: Array, full: Array, lever: float, table: Array) -
 
 
 @glue
-def _fill_weights(
-    body: Array, center: Array, geometry: Array, bands: Array, rows: Array, middle: Array
-) -> tuple[bool, bool]:
-    """Fill the weights of the cables for all facets."""
-    # Returns True if a cable has no upper limit, and True if a sag force differs from its secant.
+def _facet_weights(
+    body: Array, center: Array, geometry: Array, bands: Array, rows: Array, middle: Array, arm: float, lever: float
+) -> facets.FacetWeights:
+    """Weights of the cables for all facets; `rows` and `middle` are filled."""
     endless = curved = False
     for a in range(6):
         middle[a] = center[a]
@@ -211,32 +219,32 @@ def _fill_weights(
     for i in range(bands.shape[1]):
         limited = bands[sag.HIGH, i] < math.inf
         endless = endless or not limited
-        rows[WIDTH, i] = 0.5 * (bands[sag.HIGH, i] - bands[sag.LOW, i]) if limited else 0.0
-        rows[BELOW_SECANT, i], rows[ABOVE_SECANT, i] = bands[sag.UNDER, i], bands[sag.OVER, i]
+        rows[facets.WIDTH, i] = 0.5 * (bands[sag.HIGH, i] - bands[sag.LOW, i]) if limited else 0.0
+        rows[facets.BELOW_SECANT, i], rows[facets.ABOVE_SECANT, i] = bands[sag.UNDER, i], bands[sag.OVER, i]
         curved = curved or bands[sag.UNDER, i] < bands[sag.OVER, i]
         x, y = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i]
-        rows[LEVER_X, i] = x
-        rows[LEVER_Y, i] = y
+        rows[facets.LEVER_X, i] = x
+        rows[facets.LEVER_Y, i] = y
         for a in range(6):
-            middle[a] += rows[COLUMN + a, i] * (bands[sag.LOW, i] + rows[WIDTH, i])
+            middle[a] += rows[facets.COLUMN + a, i] * (bands[sag.LOW, i] + rows[facets.WIDTH, i])
         rise = 0.5 * (bands[sag.SAG_FORCE_HIGH, i] - bands[sag.SAG_FORCE_LOW, i]) if limited else 0.0
         sag_force = bands[sag.SAG_FORCE_LOW, i] + rise
         slope = bands[sag.SLOPE, i]
         middle[2] -= sag_force
         middle[3] -= sag_force * y
         middle[4] += sag_force * x
-        rows[COLUMN + 2, i] -= slope
-        rows[COLUMN + 3, i] -= slope * y
-        rows[COLUMN + 4, i] += slope * x
-    return endless, curved
+        rows[facets.COLUMN + 2, i] -= slope
+        rows[facets.COLUMN + 3, i] -= slope * y
+        rows[facets.COLUMN + 4, i] += slope * x
+    return facets.FacetWeights(rows, middle, bands[sag.HIGH], endless, curved, arm, lever)
 
 
 @glue
 def _measure_all_facets(
-    facets: Facets,
-    bounds: Bounds,
+    walk: facets.Facets,
+    bounds: facets.Bounds,
     m: int,
-    counts: FacetWeights,
+    counts: facets.FacetWeights,
     wrenches: wrench_set.WrenchSetArrays,
     measured: Array,
     margin: Array,
@@ -245,21 +253,21 @@ def _measure_all_facets(
     """Fill the margin over all facets (3,), and the normal of the facet with the least value (6,)."""
     # As soon as the first facets are measured, bounds exclude most of the others.
     margin[:] = math.inf
-    facets.minors[0, 0] = 1.0
-    n, size, count, c, held = facets.basis.size, 0, 1, 0, 0
-    s, slack, limit = START[n, 1], math.inf, math.inf
-    for _ in range(LIMIT):
-        for t in range(s, START[n, size + 2]):
+    walk.minors[0, 0] = 1.0
+    n, size, count, c, held = walk.basis.size, 0, 1, 0, 0
+    s, slack, limit = facets.START[n, 1], math.inf, math.inf
+    for _ in range(facets.LIMIT):
+        for t in range(s, facets.START[n, size + 2]):
             s = t
             if c == 0:
                 limit = margin[VALUE] + slack
                 if limit < math.inf:
-                    measure_bounds(facets.minors, ORDER[n, s], size + 1, count, limit, bounds)
+                    facets.measure_bounds(walk.minors, facets.ORDER[n, s], size + 1, count, limit, bounds)
             first, c = c, 0
             for b in range(first, count):
                 if limit < math.inf and bounds.excess[b] > 0.0:
                     continue
-                if _add_normal(facets, size, ORDER[n, s], b, m, measured, held):
+                if _add_normal(walk, size, facets.ORDER[n, s], b, m, measured, held):
                     held += 1
                     if held == TOGETHER:
                         c = b + 1
@@ -267,15 +275,15 @@ def _measure_all_facets(
             if c > 0:
                 break
         if c == 0:
-            size, count = next_subsets(facets, n, size)
-            s = START[n, size + 1]
+            size, count = facets.next_subsets(walk, n, size)
+            s = facets.START[n, size + 1]
         if c > 0 or size < 0:
             _measure_facets(counts, wrenches, held, measured, margin, direction)
             held = 0
             if size < 0:
                 break
             if slack == math.inf and counts.arm > 0.0:
-                slack = fill_bounds(facets, m, counts, wrenches, bounds.terms)
+                slack = facets.fill_bounds(walk, m, counts, wrenches, bounds.terms)
     margin[BELOW] = min(margin[BELOW], margin[VALUE])  # true except for rounding errors
     margin[ABOVE] = max(margin[ABOVE], margin[VALUE])
     for k in range(3):
@@ -284,17 +292,17 @@ def _measure_all_facets(
 
 
 @formula
-def _add_normal(facets: Facets, size: int, rows: int, c: int, m: int, measured: Array, b: int) -> bool:
+def _add_normal(walk: facets.Facets, size: int, rows: int, c: int, m: int, measured: Array, b: int) -> bool:
     """Fill the normal from `rows` and the subset `c` of `size` columns, one less. False if the normal is zero."""
     x = y = z = u = v = w = 0.0
     sign = 1.0
     largest = 0.0
     rounding = 0.0
     for j in range(size + 1):
-        k = MEMBERS[rows, j]
-        factor = sign * facets.minors[rows ^ (1 << k), c]
+        k = facets.MEMBERS[rows, j]
+        factor = sign * walk.minors[rows ^ (1 << k), c]
         sign = -sign
-        row = facets.table[k, m:]
+        row = walk.table[k, m:]
         x += factor * row[0]
         y += factor * row[1]
         z += factor * row[2]
@@ -310,12 +318,12 @@ def _add_normal(facets: Facets, size: int, rows: int, c: int, m: int, measured: 
     measured[NORMAL + 4 * TOGETHER + b] = v
     measured[NORMAL + 5 * TOGETHER + b] = w
     measured[ROUNDING + b] = rounding
-    return largest > DEPENDENT
+    return largest > facets.DEPENDENT
 
 
 @kernel
 def _measure_facets(
-    counts: FacetWeights,
+    counts: facets.FacetWeights,
     wrenches: wrench_set.WrenchSetArrays,
     held: int,
     measured: Array,
@@ -346,7 +354,7 @@ def _measure_facets(
 
 
 @glue
-def _sum_cables(counts: FacetWeights, held: int, measured: Array) -> None:
+def _sum_cables(counts: facets.FacetWeights, held: int, measured: Array) -> None:
     """Along the stored normals, fill half the ranges of the cables' wrenches, and the changes due to secant errors."""
     rows = counts.rows
     for b in range(held):
@@ -355,10 +363,10 @@ def _sum_cables(counts: FacetWeights, held: int, measured: Array) -> None:
         measured[DECREASE + IN_FACET + b] = measured[INCREASE + IN_FACET + b] = 0.0
         measured[UP + b] = measured[DOWN + b] = 0.0
     for i in range(rows.shape[1]):
-        width, under, over = rows[WIDTH, i], rows[BELOW_SECANT, i], rows[ABOVE_SECANT, i]
-        x, y = rows[LEVER_X, i], rows[LEVER_Y, i]
-        j0, j1, j2 = rows[COLUMN, i], rows[COLUMN + 1, i], rows[COLUMN + 2, i]
-        j3, j4, j5 = rows[COLUMN + 3, i], rows[COLUMN + 4, i], rows[COLUMN + 5, i]
+        width, under, over = rows[facets.WIDTH, i], rows[facets.BELOW_SECANT, i], rows[facets.ABOVE_SECANT, i]
+        x, y = rows[facets.LEVER_X, i], rows[facets.LEVER_Y, i]
+        j0, j1, j2 = rows[facets.COLUMN, i], rows[facets.COLUMN + 1, i], rows[facets.COLUMN + 2, i]
+        j3, j4, j5 = rows[facets.COLUMN + 3, i], rows[facets.COLUMN + 4, i], rows[facets.COLUMN + 5, i]
         for b in range(held):
             along = (
                 j0 * measured[b]
@@ -388,7 +396,7 @@ def _sum_cables(counts: FacetWeights, held: int, measured: Array) -> None:
 
 
 @glue
-def _measure_lengths(counts: FacetWeights, held: int, measured: Array) -> None:
+def _measure_lengths(counts: facets.FacetWeights, held: int, measured: Array) -> None:
     """Fill the inverse lengths of the stored normals."""
     arm, lever = counts.arm * counts.arm, counts.lever * counts.lever
     for b in range(held):
@@ -421,7 +429,7 @@ def _measure_sides(middle: Array, held: int, measured: Array) -> None:
 
 
 @glue
-def _write_normal(counts: FacetWeights, measured: Array, normals: Array, b: int, direction: Array) -> None:
+def _write_normal(counts: facets.FacetWeights, measured: Array, normals: Array, b: int, direction: Array) -> None:
     """Fill the unit normal (6,) of a stored facet, directed to its nearer side."""
     along = 0.0
     moment = 0.0
@@ -436,14 +444,14 @@ def _write_normal(counts: FacetWeights, measured: Array, normals: Array, b: int,
 
 
 @glue
-def _limiting_cable(counts: FacetWeights, direction: Array) -> int:
+def _limiting_cable(counts: facets.FacetWeights, direction: Array) -> int:
     """Index of the cable with the largest contribution along `direction`."""
     cable = -1
     most = 0.0
     for i in range(counts.rows.shape[1]):
         along = 0.0
         for k in range(6):
-            along += counts.rows[COLUMN + k, i] * direction[k]
+            along += counts.rows[facets.COLUMN + k, i] * direction[k]
         if abs(along) > most:
             most = abs(along)
             cable = i
