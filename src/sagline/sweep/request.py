@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import brief, choice, elements, file_path, listed, whole_number
+from sagline.core.arguments import brief, check_memory, choice, elements, file_path, listed, whole_number
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
 from sagline.files.quantity import in_si
