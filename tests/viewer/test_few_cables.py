@@ -10,9 +10,8 @@ import sagline as sl
 from sagline.viewer.feature import View
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
-from sagline.viewer.missing import missing_of
 from sagline.viewer.page import Page, Source
-from sagline.viewer.snapshot import Settings, snapshot_at
+from sagline.viewer.snapshot import Settings, missing_of, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.workspace import WorkspaceQuery
 from tests.kinematics.test_underconstrained import suspended

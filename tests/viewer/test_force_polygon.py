@@ -9,9 +9,8 @@ import pytest
 import sagline as sl
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.proof import force_polygon_figure, forces_on_platform, residual
-from sagline.viewer.missing import missing_of
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.snapshot import Settings, snapshot_at
+from sagline.viewer.snapshot import Settings, missing_of, snapshot_at
 from sagline.viewer.tension_scale import force_unit
 from tests.tiers import wide
 from tests.viewer.client import Client, await_that

@@ -15,8 +15,7 @@ import pytest
 import sagline as sl
 from sagline.viewer.feature import View
 from sagline.viewer.features import FEATURES
-from sagline.viewer.features.state import StateFeature
-from sagline.viewer.link import name_of, pose_part, short
+from sagline.viewer.features.state import StateFeature, name_of, pose_part, short
 from sagline.viewer.page import Page, Source
 from sagline.viewer.playback import PlayedPlan
 from tests.tiers import extended

@@ -14,11 +14,10 @@ from scipy.optimize import linprog
 import sagline as sl
 from sagline.core.arrays import locked
 from sagline.viewer.features import FEATURES
-from sagline.viewer.features.missing import explanation, missing_label
-from sagline.viewer.missing import NearestFeasible, missing_of, nearest_feasible
+from sagline.viewer.features.missing import NearestFeasible, explanation, missing_label, nearest_feasible
 from sagline.viewer.page import Page, home_pose
 from sagline.viewer.server import PageServer, chosen_by
-from sagline.viewer.snapshot import Settings, Snapshot, snapshot_at
+from sagline.viewer.snapshot import Settings, Snapshot, missing_of, snapshot_at
 from sagline.viewer.tension_scale import force_unit
 from tests.effort import best_rate
 from tests.tiers import extended, wide

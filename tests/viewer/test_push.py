@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 import sagline as sl
 from sagline import structure_matrix
 from sagline.viewer.features import push
+from sagline.viewer.features.push import Push, push_response, semi_axes
 from sagline.viewer.page import home_pose
-from sagline.viewer.push import Push, push_response, semi_axes
 from tests.refusal import refused
 from tests.tiers import wide
 

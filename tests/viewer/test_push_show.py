@@ -12,9 +12,8 @@ import sagline as sl
 from sagline.viewer import shapes
 from sagline.viewer.camera import Camera
 from sagline.viewer.features import FEATURES
-from sagline.viewer.features.push import FAR, PushFeature
+from sagline.viewer.features.push import FAR, Push, PushFeature, PushResponse, push_response
 from sagline.viewer.page import Page
-from sagline.viewer.push import Push, PushResponse, push_response
 from sagline.viewer.server import NAME
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
@@ -97,7 +96,7 @@ def test_a_kept_push_is_released_by_the_button(page: Shown) -> None:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "end", 0.5, 0.4, keep=True)
-        await_that(lambda: push_of(page) is not None and show._hold is None)
+        await_that(lambda: push_of(page) is not None and show.hold is None)
         client.drag([0.7, 0.5, 1.5])  # it stays where it acts, and is answered at the new place
         await_that(lambda: (now := push_of(page)) is not None and now.state.pose.position[0] == 0.7)
         client.set(handle(page, "Release"), True)
@@ -107,7 +106,7 @@ def test_a_kept_push_is_released_by_the_button(page: Shown) -> None:
         client.set(handle(page, "Keep after release"), True)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "end", 0.5, 0.4)
-        await_that(lambda: push_of(page) is not None and show._hold is None)
+        await_that(lambda: push_of(page) is not None and show.hold is None)
         client.set(handle(page, "Keep after release"), False)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "cancel", 0.5, 0.4)
@@ -122,8 +121,8 @@ def test_points_behind_the_camera_are_not_pushed(page: Shown) -> None:
         eye = Camera(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
         await_that(lambda: page.viewer.state is not None)
         show._grab(eye, np.array([0.5, 0.5]), -1)  # no client whose end would release it
-        assert (show._hold is not None) == held
-    show._hold = None
+        assert (show.hold is not None) == held
+    show.hold = None
 
 
 def pushes(push: Push, at: list[float], force: list[float]) -> bool:
@@ -188,5 +187,5 @@ def test_invalid_pushes_are_ignored(page: Shown, value: Any) -> None:
         before = page.viewer.updates
         tell(client, page, "pull", value)
         await_that(lambda: page.viewer.updates > before)
-        assert show._hold is None
+        assert show.hold is None
         assert push_of(page) is None

@@ -8,10 +8,9 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import readout
-from sagline.viewer.missing import missing_of
 from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
-from sagline.viewer.snapshot import Settings, snapshot_at
+from sagline.viewer.snapshot import Settings, missing_of, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.timeline import COLORS
 

@@ -14,9 +14,8 @@ from typing import Final, TypeVar
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.robot.equilibrium import Equilibrium
-from sagline.viewer.missing import MissingWrench
 from sagline.viewer.player import Configuration, Played
-from sagline.viewer.snapshot import Settings, Snapshot
+from sagline.viewer.snapshot import MissingWrench, Settings, Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
 

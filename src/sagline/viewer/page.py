@@ -26,12 +26,11 @@ from sagline.robot.robot import Robot
 from sagline.viewer import readout, shapes
 from sagline.viewer.camera import Framing
 from sagline.viewer.feature import Feature, View
-from sagline.viewer.missing import missing_of
 from sagline.viewer.panel import ControlPanel
 from sagline.viewer.player import Beside, InMotion, Played, Player
 from sagline.viewer.robot_scene import APART, TRACE_POINTS, RobotScene
 from sagline.viewer.server import Channel
-from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, snapshot_at
+from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, missing_of, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 
 FRAME_TIME = 1.0 / 60.0  # shortest time between updates [s]

@@ -1,4 +1,4 @@
-"""Settings of the panel, and the solutions of the robot at one pose: with these settings, and by every method."""
+"""Settings of the panel, solutions of the robot at one pose (with these settings, by every method), missing wrench."""
 
 from __future__ import annotations
 
@@ -9,29 +9,31 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, Elastic, Empirical, models_by_name
-from sagline.core.arrays import Array
-from sagline.core.errors import CableGeometryError, InvalidValueError
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import CableGeometryError, InvalidValueError, SaglineError
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_rows import Given
 from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot, with_mass
+from sagline.statics.balance import structure_matrix
 from sagline.tension.method import TensionMethod, shared_tension
-from sagline.tension.methods import DEFAULT, QuadraticProgram, methods_by_name
+from sagline.tension.methods import DEFAULT, MinimumNorm, QuadraticProgram, methods_by_name
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import force_unit
 
 BY_HAND: Final = "chosen by hand"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class ByHand(QuadraticProgram):
     """Feasible tensions that are closest to tensions chosen by hand; at the pose of the choice, both are equal.
 
@@ -262,3 +264,70 @@ def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> M
             return MethodMark(name, letter, np.full(robot.cable_count, np.nan), str(error))
         tension, status = found.chord_tension, PoseStatus(int(found.status))
     return MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
+
+
+ATTEMPTS: Final = 4
+MORE: Final = 1.0 + 1e-9  # factor of the wrench, by which the pose is slightly inside the boundary
+NEAR: Final = 1e-4  # relative distance to a limit below which a tension counts as at the limit
+_EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MissingWrench:
+    """Smallest wrench that makes a pose feasible; it is a force without moment if a force is sufficient."""
+
+    wrench: Array  # missing wrench about the center of mass, world axes [N, N m], shape (6,)
+    state: Equilibrium  # plan with this wrench, in which the blocking cables are at their limits
+    limits: dict[int, bool]  # cables at limits: True at the lower limit, False at the upper limit
+
+    @property
+    def force(self) -> Array:
+        """Force of the wrench [N], shape (3,)."""
+        return self.wrench[:3]
+
+    @property
+    def moment(self) -> Array:
+        """Moment of the wrench [N m], shape (3,); zero if a force alone is sufficient."""
+        return self.wrench[3:]
+
+
+def missing_of(snapshot: Snapshot) -> MissingWrench | None:
+    """Missing wrench of an infeasible pose; None for other failures, or if no wrench was found."""
+    plan = snapshot.plan
+    if plan is None or snapshot.status not in _EXPLAINED or is_underconstrained(snapshot.robot):
+        return None
+    robot, state = snapshot.robot, plan.state
+    missing, held = np.zeros(6), plan
+    with suppress(SaglineError):
+        for _ in range(ATTEMPTS):
+            missing += MORE * _step(held)
+            held = inverse(robot, snapshot.pose, state.cables.model, MinimumNorm(), locked(state.wrench + missing))
+            if held.feasible:
+                return MissingWrench(locked(missing), held.state, _limits(plan, held))
+    return None
+
+
+def _step(plan: Plan) -> Array:
+    """Wrench (6,) [N, N m] of the smallest sufficient force. If no force is sufficient, the smallest wrench."""
+    if plan.relief is not None and np.isfinite(plan.relief).all():
+        return np.concatenate((plan.relief, np.zeros(3)))
+    robot = plan.state.one_robot
+    matrix, freedom = structure_matrix(robot, plan.state.pose), robot.freedom
+    needed = np.zeros(6) if plan.needed is None else np.nan_to_num(plan.needed)
+    turning = np.abs(freedom[:, 3:]).max(axis=1) > 0.5
+    lever = float(np.abs(matrix[turning]).max(initial=0.0)) or 1.0  # [m], a moment counts as the force at this arm
+    unit = np.where(turning, 1.0 / lever, 1.0)
+    low = robot.tension_min
+    high = np.maximum(robot.tension_max, low * (1.0 + 1e-9) + 1e-9)  # the solver requires low < high
+    found = lsq_linear(unit[:, None] * matrix, unit * (freedom @ needed), (low, high), tol=1e-12)
+    return np.asarray(freedom.T @ (freedom @ needed - matrix @ found.x))
+
+
+def _limits(plan: Plan, held: Plan) -> dict[int, bool]:
+    """Cables at limits. If a force is sufficient, these are the plan's blocking cables, otherwise those of `held`."""
+    robot, tension = plan.state.one_robot, held.state.limited_tension
+    to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
+    which = plan.blocking
+    if not np.isfinite(plan.shortfall):
+        which = np.minimum(to_lower, to_upper) <= NEAR * tension
+    return {int(k): bool(to_lower[k] <= to_upper[k]) for k in np.flatnonzero(which)}

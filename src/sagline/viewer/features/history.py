@@ -89,7 +89,7 @@ class HistoryFeature(Feature):
 
     def tick(self) -> None:
         """Record inputs that no longer change."""
-        dragged = self._page.dragging or self._page.feature(PushFeature).held
+        dragged = self._page.dragging or self._page.feature(PushFeature).hold
         if self._changed and not dragged and time.monotonic() - self._changed > PAUSE:
             self._record()
 

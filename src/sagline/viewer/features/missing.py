@@ -1,11 +1,11 @@
-"""Explanation of an infeasible pose."""
+"""Explanation of an infeasible pose, and the search for the nearest feasible pose."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from contextlib import suppress
 from html import escape
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -13,18 +13,106 @@ from sagline.cables.model import CableModel
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.core.numbers import n
+from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 from sagline.tension.margin import unresisted_motion
 from sagline.viewer import shapes
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.tensions import SHARING
-from sagline.viewer.missing import MissingWrench, NearestFeasible, nearest_feasible
 from sagline.viewer.page import Page
 from sagline.viewer.readout import definitions, html_block
 from sagline.viewer.robot_scene import INFEASIBLE, Nodes
 from sagline.viewer.server import chosen_by
-from sagline.viewer.snapshot import Snapshot, method_name
+from sagline.viewer.snapshot import MissingWrench, Snapshot, method_name
 from sagline.viewer.tension_scale import ForceUnit, cables_text, force_unit, number_text
+from sagline.viewer.workspace import CELLS, DIRECTIONS, WorkspaceQuery, free_directions
+from sagline.workspaces.region import region_of
+from sagline.workspaces.wrench_sets import WrenchBox
+
+NODES: Final = 15  # nodes of the first grid along each axis
+AROUND: Final = 2  # points of a finer grid on each side of its center
+STARTS: Final = 4
+ITERATIONS: Final = 40
+FINEST: Final = 1e-6  # finest grid, relative to the region's size
+BLOCK: Final = 250  # positions per call: a few milliseconds, then other threads can run
+INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # steps inward from the boundary, as shares of the region's size
+
+
+class NearestFeasible(NamedTuple):
+    """The nearest feasible pose."""
+
+    pose: Pose
+    distance: float  # distance from the given pose [m]
+    turned: bool  # True if the orientation differs too
+
+
+def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestFeasible | None:
+    """Nearest feasible pose within the robot's region, at the orientation of a pose or level; None if none exists."""
+    for turned in (False, True):
+        start = Pose(pose.position, np.eye(3)) if turned else pose
+        if turned and np.allclose(start.matrix, pose.matrix):
+            break
+        try:
+            found = _nearest_position(robot, pose.position, start, model, wrench)
+        except SaglineError:  # the motion pattern excludes this rotation
+            continue
+        if found is not None:
+            there = Pose.from_quaternion(found, start.quaternion)
+            return NearestFeasible(there, float(np.linalg.norm(found - pose.position)), turned)
+    return None
+
+
+def _nearest_position(
+    robot: Robot, start: Array, orientation: Pose, model: CableModel, wrench: Array | None
+) -> Array | None:
+    """The feasible position (3,) [m] nearest to `start`, at one orientation; None if none exists."""
+    levels = WorkspaceQuery(robot, orientation.quaternion, model, WrenchBox(center=wrench)).levels()
+    region = region_of(robot, None, CELLS)
+    free = np.flatnonzero(np.any(DIRECTIONS[free_directions(robot, region.flat)] > 0.0, axis=0))
+    size = float(np.max(region.high - region.low))
+
+    def grid(axes: list[Array]) -> Array:
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+    def feasible(places: Array) -> Array:
+        parts = [places[k : k + BLOCK] for k in range(0, len(places), BLOCK)]
+        held = [np.empty(0, bool), *(levels.details(part).margin >= 0.0 for part in parts)]
+        return np.asarray(places[np.concatenate(held)])
+
+    def refined(best: Array) -> Array:
+        """The nearest position, by a search from the feasible position `best` on finer and finer grids."""
+        step = (region.high - region.low)[free] / (NODES - 1)
+        offsets = grid([np.linspace(-1.0, 1.0, 2 * AROUND + 1)] * len(free))
+        for _ in range(ITERATIONS):
+            places = np.tile(best, (len(offsets), 1))
+            places[:, free] += offsets * step
+            held = feasible(places[np.linalg.norm(places - start, axis=1) < np.linalg.norm(best - start)])
+            if len(held):
+                best = held[np.argmin(np.linalg.norm(held - start, axis=1))]
+            else:
+                step = step / AROUND
+                if step.max() < FINEST * size:
+                    break
+        return best
+
+    axes = [np.linspace(region.low[axis], region.high[axis], NODES) for axis in free]
+    nodes = np.tile(start, (NODES ** len(axes), 1))
+    nodes[:, free] = grid(axes)
+    inside = feasible(nodes)
+    if not len(inside):
+        return None
+    order = np.argsort(np.linalg.norm(inside - start, axis=1))[:STARTS]
+    best = min((refined(node) for node in inside[order]), key=lambda at: float(np.linalg.norm(at - start)))
+    way = best - start
+    way = way / max(float(np.linalg.norm(way)), 1e-12)
+    for share in INWARD:  # slightly inside the boundary, where `inverse` has a solution
+        place = best + share * size * way
+        if inverse(robot, Pose.from_quaternion(place, orientation.quaternion), model, wrench=wrench).feasible:
+            return np.asarray(place)
+    return None
+
 
 GO: Final = "go-there"  # topic of the button that moves the platform to the nearest pose
 NEGLIGIBLE: Final = 1e-9  # smaller moments, relative to the force at an arm of one meter, count as zero

@@ -1,29 +1,183 @@
-"""Field of the pose, and state of the page as code or as a link."""
+"""Field of the pose, and state of the page as code or as a link that contains the values of the controls."""
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable
 from dataclasses import fields
 from functools import partial
 from typing import Any, Final
-from urllib.parse import quote, urlencode
+from urllib.parse import parse_qsl, quote, urlencode
+from zlib import crc32
 
 import numpy as np
+import viser
 
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.files.quantity import STRONGEST, pose_of_text
+from sagline.files.quantity import STRONGEST, decimal_numbers, plain_number, pose_of_text
+from sagline.files.robot_file import dump_robot
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.methods import QuadraticProgram
-from sagline.viewer import link
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page, Source
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block
+from sagline.viewer.server import NAME
 from sagline.viewer.snapshot import ByHand, Settings, Snapshot, given_yaw
 from sagline.viewer.tension_scale import number_text
+
+LONGEST: Final = 4000  # largest number of characters in a link
+LONGEST_TEXT: Final = 60  # largest number of characters in a value, and in a quotation in a message
+FARTHEST: Final = 1e12  # limit of numbers without limits of their own
+STEP: Final = "Copy the link again."
+SAFE: Final = ",:.+"  # characters that do not require an escape in a fragment
+_NUMBERS: Final = (viser.GuiSliderHandle, viser.GuiNumberHandle)
+_VECTORS: Final = (viser.GuiVector2Handle, viser.GuiVector3Handle)
+_KINDS: Final = (*_NUMBERS, *_VECTORS, viser.GuiDropdownHandle, viser.GuiCheckboxHandle, viser.GuiTextHandle)
+
+
+def _parts_of(text: str) -> dict[str, str]:
+    """Read the parts of a state from its text."""
+    try:
+        pairs = parse_qsl(text, keep_blank_values=True, strict_parsing=True, max_num_fields=200, errors="strict")
+    except (ValueError, UnicodeError):
+        pairs = []
+    parts = dict(pairs)
+    if len(text) > LONGEST or len(parts) != len(pairs) or "robot" not in parts:
+        raise _refused("the link", text, "robot=...&pose=... and so on")
+    return parts
+
+
+def name_of(robot: Robot) -> str:
+    """Name and checksum of a robot in a link; the checksum excludes the load on the platform."""
+    fixed = dump_robot(robot.replace(mass=1.0, inertia=np.eye(3)))
+    return f"{robot.name}:{crc32(fixed.encode()):08x}"
+
+
+def pose_part(pose: Pose) -> str:
+    """Text of a pose in the format of the command line, with twelve digits."""
+    angles = pose.rotation.as_euler("ZYX", degrees=True)
+    return _listed([*pose.position, *angles] if np.any(np.abs(angles) > 1e-12) else pose.position)
+
+
+def _listed(values: Any) -> str:
+    """Numbers between commas."""
+    return ",".join(f"{value + 0.0:.12g}" for value in values)
+
+
+def _numbers_of(text: str, item: str, unit: str, count: int, largest: float) -> Array:
+    """Exactly `count` numbers between commas."""
+    return np.array(decimal_numbers(_split(text, item, count), item, unit, largest))
+
+
+def _shortest(number: float) -> str:
+    """A number with the fewest digits that identify it."""
+    return repr(number).removesuffix(".0")
+
+
+def short(label: str) -> str:
+    """Name of a control in a link; for example, the name of "Platform + load [kg]" is platform-load."""
+    return "-".join(re.findall(r"[a-z0-9]+", re.sub(r"\[.*?\]", "", label.lower())))
+
+
+class _LinkedControls:
+    """All controls of a page; later controls are included."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        """Store the present values as defaults. Links contain only values that differ from the defaults."""
+        self._gui = gui
+        self._defaults = self.values()
+
+    def _handles(self) -> dict[str, Any]:
+        """Controls by their names; viser has no public list of them."""
+        handles: dict[str, Any] = {}
+        for handle in tuple(self._gui._gui_input_handle_from_uuid.values()):
+            if isinstance(handle, _KINDS) and handle.label != NAME and short(handle.label):
+                name = short(handle.label)
+                others = sum(short(other.label) == name for other in handles.values())
+                handles[f"{name}-{others + 1}" if others else name] = handle  # repeated names: force, force-2 and so on
+        return handles
+
+    def changes(self) -> dict[str, str]:
+        """Texts of the values that differ from the defaults, by the names of the controls."""
+        known, defaults = self._handles().items(), self._defaults
+        return {name: _text(each) for name, each in known if name not in defaults or defaults[name] != each.value}
+
+    def read(self, texts: dict[str, str]) -> Callable[[], None]:
+        """Function that sets controls to the values `texts` of a link, and all other controls to their defaults."""
+        handles = self._handles()
+        unknown = next((name for name in texts if name not in handles), None)
+        if unknown is not None:
+            raise InvalidValueError("the link", f"with {unknown[:LONGEST]!r}", "controls of this page", STEP)
+        values = self._defaults | {name: _value(handles[name], name, text) for name, text in texts.items()}
+        return lambda: self.put(values)
+
+    def values(self) -> dict[str, Any]:
+        """Values of all controls by their names."""
+        return {name: handle.value for name, handle in self._handles().items()}
+
+    def put(self, values: dict[str, Any]) -> None:
+        """Set the named controls."""
+        for name, handle in self._handles().items():
+            if name in values:
+                handle.value = values[name]
+
+
+def _text(handle: Any) -> str:
+    value = handle.value
+    if isinstance(handle, viser.GuiCheckboxHandle):
+        return str(int(value))
+    if isinstance(handle, viser.GuiDropdownHandle):
+        return short(value) or str(value)
+    if isinstance(handle, _VECTORS):
+        return ",".join(map(_shortest, value))
+    return str(value) if isinstance(handle, viser.GuiTextHandle) else _shortest(value)
+
+
+def _value(handle: Any, name: str, text: str) -> Any:
+    if isinstance(handle, _NUMBERS):
+        number = _number(text, name, handle.min, handle.max)
+        return int(number) if isinstance(handle.value, int) else number
+    if isinstance(handle, _VECTORS):
+        count = len(handle.value)
+        ends = handle.min or (None,) * count, handle.max or (None,) * count
+        rows = zip(_split(text, name, count), *ends, strict=True)
+        return tuple(_number(part, name, low, high) for part, low, high in rows)
+    if isinstance(handle, viser.GuiTextHandle):
+        if len(text) > LONGEST_TEXT or not text.isprintable():
+            raise _refused(name, text, f"a text of up to {LONGEST_TEXT} characters")
+        return text
+    options: dict[str, Any] = {"0": False, "1": True}
+    if isinstance(handle, viser.GuiDropdownHandle):
+        options = {short(option) or option: option for option in handle.options}
+    if text not in options:
+        raise _refused(name, text, ", ".join(options)[:120])
+    return options[text]
+
+
+def _number(text: str, name: str, least: float | None, most: float | None) -> float:
+    number = plain_number(text)
+    low, high = (-FARTHEST if least is None else least), (FARTHEST if most is None else most)
+    if number is None or not low <= number <= high:
+        raise _refused(name, text, f"{low:g} to {high:g}")
+    return number
+
+
+def _split(text: str, item: str, count: int) -> list[str]:
+    """Exactly `count` parts between commas."""
+    parts = text.split(",", maxsplit=count)
+    if len(parts) != count:
+        raise _refused(item, text, f"{count} numbers")
+    return parts
+
+
+def _refused(item: str, text: str, allowed: str) -> InvalidValueError:
+    return InvalidValueError(item, repr(text[:LONGEST_TEXT]), allowed, STEP)
+
 
 FIRST: Final = -0.9  # order among the controls: above all controls except those of the played motion
 EXAMPLE: Final = "1, 0, 1.5 or 1, 0, 1.5, 10, 0, 0"
@@ -62,7 +216,7 @@ class StateFeature(Feature):
         """Build the panel after all other controls, because links contain their values."""
         page.server.gui.add_html(_CONTENT, order=FIRST)
         self._page, self._channel, self._robot = page, page.channel, page.robot
-        self.controls = link.LinkedControls(page.server.gui)
+        self.controls = _LinkedControls(page.server.gui)
         self._view: View | None = None
         self._time = 0.0
         self._requests: deque[tuple[Any, int]] = deque()  # requests to copy a text, and their clients
@@ -111,39 +265,42 @@ class StateFeature(Feature):
         return code_of(view, self._robot, source, self._time)
 
     def _link_to(self, view: View, client: int) -> str:
-        parts = {"robot": link.name_of(self._robot)}
+        parts = {"robot": name_of(self._robot)}
         if view.played is not None:
             parts["time"] = repr(float(self._page.player.time))
         else:
-            parts["pose"] = link.pose_part(view.snapshot.pose)
+            parts["pose"] = pose_part(view.snapshot.pose)
         if view.wrench is not None:
-            parts["wrench"] = link.listed(view.wrench)
+            parts["wrench"] = _listed(view.wrench)
         camera = self._page.framing.moved(client)
         if camera is not None:
-            parts["camera"] = link.listed(camera)
+            parts["camera"] = _listed(camera)
         controls = self.controls.changes()
         if MASS in controls or self._page.source.mass is not None:
-            controls[MASS] = link.shortest(view.settings.mass)
+            controls[MASS] = _shortest(view.settings.mass)
         if isinstance(view.settings.tension, ByHand):
             controls.pop(SHARING, None)
-            parts[HAND] = link.listed(np.asarray(view.settings.tension.target))
-        return urlencode({**parts, **controls}, safe=link.SAFE, quote_via=quote)
+            parts[HAND] = _listed(np.asarray(view.settings.tension.target))
+        return urlencode({**parts, **controls}, safe=SAFE, quote_via=quote)
 
     def _open_link(self, text: str, client: int) -> None:
         """Bring the page and the camera of `client` to the state of a link. An invalid link changes nothing."""
-        parts = link.parts_of(text)
-        link.check_robot(parts.pop("robot"), self._robot)
+        parts, own = _parts_of(text), self._robot.name
+        if (given := parts.pop("robot")) != name_of(self._robot):
+            name = given.rpartition(":")[0]
+            other = "another robot of this name" if name == own else repr((name or given)[:LONGEST_TEXT])
+            raise InvalidValueError("the link", f"of {other}", own, "Open it with its own robot.")
         place, framing = self._place(parts), self._page.framing
         wrench, camera = (
-            link.numbers_of(parts.pop(name), f"the {name} of the link", unit, 6, largest) if name in parts else None
+            _numbers_of(parts.pop(name), f"the {name} of the link", unit, 6, largest) if name in parts else None
             for name, unit, largest in (("wrench", "N or N m", STRONGEST), ("camera", "m", framing.farthest))
         )
         if camera is not None and np.array_equal(camera[:3], camera[3:]):
-            raise InvalidValueError("the camera of the link", "at its own target", "two different points", link.STEP)
+            raise InvalidValueError("the camera of the link", "at its own target", "two different points", STEP)
         hand = parts.pop(HAND, None)
         method = None
         if hand is not None:
-            method = ByHand(target=link.numbers_of(hand, HAND, "N", self._robot.cable_count, STRONGEST))
+            method = ByHand(target=_numbers_of(hand, HAND, "N", self._robot.cable_count, STRONGEST))
         self.controls.read(parts)()
         self._page.wrench = wrench
         if method is not None:
@@ -157,15 +314,15 @@ class StateFeature(Feature):
         """Function that goes to the pose or the time of a link."""
         time, pose, player = parts.pop("time", None), parts.pop("pose", None), self._page.player
         if (time is None) == (pose is None):
-            raise InvalidValueError("the link", "with both or none", "a pose or a time", link.STEP)
+            raise InvalidValueError("the link", "with both or none", "a pose or a time", STEP)
         if pose is not None:
-            target = pose_of_text(pose, "the pose of the link", link.STEP)
+            target = pose_of_text(pose, "the pose of the link", STEP)
             self._page.check_near(target)
             return lambda: self._page.go(target)
         if player.played is None:
             step = "Open it with the same run: sagline view ROBOT RUN."
             raise InvalidValueError("the link", "with a time of a run", "a pose, because nothing is played", step)
-        moment = float(link.numbers_of(time or "", "the time of the link", "s", 1, player.duration)[0])
+        moment = float(_numbers_of(time or "", "the time of the link", "s", 1, player.duration)[0])
         return lambda: player.scrub_to(max(moment, 0.0))
 
 
