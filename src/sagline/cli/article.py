@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 ROBOTS = ("article-suspended", "article-mixed")
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
 HULLS = ("hull-suspended", "hull-mixed")  # workspaces with sag, which the article names as future work
-CELLS = (
-    20  # cells along the longest edge of the frame: this takes half a second per robot, and volumes are within 0.2 %
-)
+CELLS = 20  # cells along the longest edge of the frame: half a second per robot, and volumes are within 0.2 %
 
 
 def run(files: opt.Files = opt.Files()) -> int:
@@ -159,7 +157,9 @@ def experiment(
         step = "Begin a robot file with base: article-prototype, and give the values that differ from it."
         raise sl.InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
     output = Output(files, "", NAMES, (), TABLE)
-    how = _how(None if true is None else real.name, waits)
+    machine = "a twin of the prototype as planned" if true is None else f"a twin of {real.name}"
+    way = "in one process, not in real time" if waits else "over four S7 connections, in real time"
+    how = f"The controller drove {machine}, {way}; its model was the prototype of Table 1, with assumed anchors."
     with working("home, ten points, home") as line:
 
         def tell(share: float) -> None:
@@ -190,12 +190,6 @@ def _apart_over_s7(true: sl.Robot, nominal: sl.Robot, seed: int, tell: Tell) -> 
         return driven(sl.control.Controller(nominal, link, pace=sl.control.Pace(), record=watch), watch)
 
 
-def _how(true: str | None, waits: bool) -> str:
-    machine = "a twin of the prototype as planned" if true is None else f"a twin of {true}"
-    way = "in one process, not in real time" if waits else "over four S7 connections, in real time"
-    return f"The controller drove {machine}, {way}; its model was the prototype of Table 1, with assumed anchors."
-
-
 def _rows(result: Experiment) -> list[list[object]]:
     """Heads of the columns, then number, desired position, article's distance and own distance of each point."""
     table = result.table
@@ -207,15 +201,10 @@ def _rows(result: Experiment) -> list[list[object]]:
 def _tell(result: Experiment) -> None:
     table = result.table
     places = [", ".join(number_text(x, ".2f") for x in place) for place in table.desired]
-    distances = zip(
-        (*table.distance, np.mean(table.distance)), (*result.distance, np.mean(result.distance)), strict=True
-    )
-    rows = [
-        [str(point), place, number_text(1e3 * theirs, ".1f"), number_text(1e3 * ours, ".3f")]
-        for point, place, (theirs, ours) in zip((*table.points, "mean"), (*places, ""), distances, strict=True)
-    ]
-    verdict = f"Mean distance of the points {n(1e3 * np.mean(result.distance), '.3f', 'mm')}"
-    verdict += f"; {n(1e3 * np.mean(table.distance), '.1f', 'mm')} in the article."
+    theirs, ours = (1e3 * np.append(each, np.mean(each)) for each in (table.distance, result.distance))
+    texts = [number_text(each, ".1f") for each in theirs], [number_text(each, ".3f") for each in ours]
+    rows = [list(row) for row in zip((*map(str, table.points), "mean"), (*places, ""), *texts, strict=True)]
+    verdict = f"Mean distance of the points {n(ours[-1], '.3f', 'mm')}; {n(theirs[-1], '.1f', 'mm')} in the article."
     show_table(TextTable(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows), verdict)
     took = n(result.duration / 60.0, ".1f", "min")
     show_text(f"It took {took}; the fastest winch had {n(1e3 * result.winch_speed, '.0f', 'mm/s')}.")

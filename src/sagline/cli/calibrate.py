@@ -22,7 +22,7 @@ ROBOTS: Final = (".yaml", ".yml")
 WHOLE: Final = ".nc"
 TABLE: Final = ".csv"
 FIGURES: Final = (".png", ".svg", ".pdf")
-WITHOUT_PLAN: Final = opt.only_without("--plan")
+NO_PLAN: Final = opt.only_without("--plan")
 VALIDATION: Final = ("folds", "position_m", "position_before_m", "tension_n", "tension_before_n")
 
 
@@ -34,14 +34,9 @@ def _deviation(quantity: str, unit: str) -> float | None:
 class _Options:
     """Options of the fit and of the choice of poses. A standard deviation of None means that of the log."""
 
-    columns: Path | None = opt.option(None, "FILE", "Map of columns for a LOG with other names (.yaml).", WITHOUT_PLAN)
+    columns: Path | None = opt.option(None, "FILE", "Map of columns for a LOG with other names (.yaml).", NO_PLAN)
     rest: float | None = opt.quantity(
-        None,
-        "TIME",
-        "Average each rest of at least this time in a LOG with motion, '1 s'.",
-        "s",
-        WITHOUT_PLAN,
-        above=0.0,
+        None, "TIME", "Average each rest of at least this time in a LOG with motion, '1 s'.", "s", NO_PLAN, above=0.0
     )
     out: list[Path] | None = opt.out(None, "none")
     unknowns: str | None = opt.option(
@@ -59,14 +54,14 @@ class _Options:
     rotation_deviation: float | None = _deviation("a measured rotation, '1 mrad'", "rad")
     swivel_deviation: float | None = _deviation("a measured swivel angle, '5 mrad'", "rad")
     frequency_deviation: float | None = _deviation("a measured natural frequency, '0.02 Hz'", "Hz")
-    folds: int = opt.option(5, "NUMBER", "Groups of poses for the cross-validation; 0 for none.", WITHOUT_PLAN)
-    robust: bool = opt.flag(True, "Give outliers less weight.", "--robust/--no-robust", WITHOUT_PLAN)
-    model: str = opt.if_only(opt.MODEL, WITHOUT_PLAN)
-    plot: Path | None = opt.option(None, "FILE", "Figure of the fit: .png, .svg or .pdf.", WITHOUT_PLAN)
+    folds: int = opt.option(5, "NUMBER", "Groups of poses for the cross-validation; 0 for none.", NO_PLAN)
+    robust: bool = opt.flag(True, "Give outliers less weight.", "--robust/--no-robust", NO_PLAN)
+    model: str = opt.if_only(opt.MODEL, NO_PLAN)
+    plot: Path | None = opt.option(None, "FILE", "Figure of the fit: .png, .svg or .pdf.", NO_PLAN)
     plan: int | None = opt.option(None, "NUMBER", "Without LOG: choose this number of poses to measure.")
     seed: int = opt.seed(0, opt.only_with("--plan"))
     style: str = opt.if_only(opt.STYLE, opt.only_with("--plot"))
-    table: bool = opt.if_only(opt.TABLE, WITHOUT_PLAN)
+    table: bool = opt.if_only(opt.TABLE, NO_PLAN)
     as_json: bool = opt.JSON
 
     def parameters(self, robot: sl.Robot) -> list[str | sl.Unknown] | None:
@@ -133,7 +128,7 @@ def calibrate(
         "LOG",
         "CSV file, one row per pose: count_0, ... or length_0, ...; load_cell_0, ...; x, y, z if measured. Or an .npz "
         "or .mat file.",
-        WITHOUT_PLAN,
+        NO_PLAN,
     ),
     given: _Options = _Options(),
 ) -> int:

@@ -49,7 +49,8 @@ def control(
     if priority is not None:
         set_priority(priority)  # before the threads of `link` and `log` start, which inherit the priority
     with ExitStack() as stack:
-        link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
+        kind = sl.plc.ModbusLink if modbus else sl.plc.S7Link
+        link = stack.enter_context(closing(kind(plc, robot)))
         record = None
         if log is not None:
             from sagline.files.mcap_writer import Recorder
@@ -60,10 +61,6 @@ def control(
         gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
         session = OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow)
         return session.run()
-
-
-def _link(robot: sl.Robot, plc: str, *, modbus: bool) -> sl.control.Link:
-    return sl.plc.ModbusLink(plc, robot) if modbus else sl.plc.S7Link(plc, robot)
 
 
 LOOK: Final = 0.1  # time between two checks of the PLCs [s]

@@ -17,6 +17,7 @@ from sagline.files.writing import create_folder
 
 LEAST = 1e-6  # smallest position error that is printed [m]
 ENDINGS = {"robot": (".yaml", ".yml"), "mjcf": (".xml", ".mjcf"), "javascript": (".json",)}
+WITH_STIFFNESS, WITH_DENSITY = opt.only_with("--axial-stiffness"), opt.only_with("--linear-density")
 KINDS = {"robot": "a robot file", "mjcf": "a MuJoCo model", "javascript": "a robot for JavaScript"}
 
 
@@ -35,18 +36,10 @@ def convert(
         "--kind",
     ),
     linear_density: float | None = opt.quantity(
-        None,
-        "QUANTITY",
-        "Linear density of all cables, for instance '65 g/m'.",
-        "kg/m",
-        opt.only_with("--axial-stiffness"),
+        None, "QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m", WITH_STIFFNESS
     ),
     axial_stiffness: float | None = opt.quantity(
-        None,
-        "QUANTITY",
-        "Axial stiffness EA of all cables, for instance '700 kN'.",
-        "N",
-        opt.only_with("--linear-density"),
+        None, "QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N", WITH_DENSITY
     ),
     cable_set: str | None = opt.option(None, "NAME", "CASPR: name of the cable set. Default: that of the file."),
     at: tuple[str, str, str] | None = opt.option(

@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.numbers import n
 
@@ -97,10 +97,7 @@ def _record(cable: sl.CableFit, model: sl.EmpiricalFit) -> dict[str, Any]:
     return {
         "values": dict(zip(cable.names, cable.values, strict=True)),
         "standard_errors": dict(zip(cable.names, cable.standard_error, strict=True)),
-        "covariance": cable.covariance,
-        "correlation": cable.correlation,
-        "chi_squared": cable.chi_squared,
-        "warnings": list(cable.warnings),
+        **values_of(cable, "covariance", "correlation", "chi_squared", "warnings"),
         "empirical": {
             "k_h": model.k_h._asdict(),
             "k_p": model.k_p._asdict(),

@@ -82,7 +82,10 @@ def _tell(done: sl.control.Execution) -> None:
     show_table(TextTable(["largest", "value", "cable", "at [s]"], largest))
     show_table(TextTable(["cycles by their delay", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
     if done.events:
-        rows = [_row(done, event) for event in done.events[:MOST_EVENTS]]
+        rows = [
+            [f"{_since(done, each.time):.2f}", f"{each.kind} {each.name}", each.text]
+            for each in done.events[:MOST_EVENTS]
+        ]
         show_table(TextTable(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
     if len(done.events) > MOST_EVENTS:
         show_text(f"… and {len(done.events) - MOST_EVENTS:,} more events: --to FILE.nc has all of them.")
@@ -90,10 +93,6 @@ def _tell(done: sl.control.Execution) -> None:
 
 def _since(done: sl.control.Execution, time: float) -> float:
     return float(time - done.time[0])
-
-
-def _row(done: sl.control.Execution, event: sl.control.Event) -> list[str]:
-    return [f"{_since(done, event.time):.2f}", f"{event.kind} {event.name}", event.text]
 
 
 def _states(done: sl.control.Execution) -> list[list[str]]:
@@ -131,11 +130,8 @@ def _histogram(done: sl.control.Execution) -> list[list[str]]:
     """Histogram of the cycles' delays, without the empty bars at its end."""
     counts = [int(np.count_nonzero(done.late <= 0.0))]
     counts += [int(np.count_nonzero((done.late > low) & (done.late <= high))) for low, high in pairwise(LATE)]
-    names = [
-        "not at all",
-        *(f"up to {n(high, '.3g', 's')}" for high in LATE[1:-1]),
-        f"more than {n(LATE[-2], '.3g', 's')}",
-    ]
+    names = ["not at all", *(f"up to {n(high, '.3g', 's')}" for high in LATE[1:-1])]
+    names.append(f"more than {n(LATE[-2], '.3g', 's')}")
     last = max((k for k, count in enumerate(counts) if count), default=0)
     most = max(*counts, 1)
     return [

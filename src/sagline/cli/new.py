@@ -81,7 +81,9 @@ def new(
     design, said = _answered(file.stem, asdict(answers))
     with working(f"checking {prod(GRID)} poses of each of a few boxes"):
         robot, middle = _boxed(design)
-    text = _header(said) + sl.dump_robot(robot)
+    given = ", ".join(f"{key} {' '.join(value.split())}" for key, value in said.items())
+    header = f"# made by sagline new: {given}\n# values in SI units; a quantity may also have its unit, 22 mm^2\n"
+    text = header + sl.dump_robot(robot)
     made = parse_robot(text, file)
     write_text(file, text)
     with working("checking the robot"):
@@ -89,11 +91,8 @@ def new(
     for line in lines:
         show_text(line)
     if share < NEARLY_ALL:
-        show_note(
-            "Advice: ",
-            "for a larger share, try a larger platform, the other layout, a thicker rope or a smaller mass.",
-            style="bold",
-        )
+        advice = "for a larger share, try a larger platform, the other layout, a thicker rope or a smaller mass."
+        show_note("Advice: ", advice, style="bold")
     for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
         show_text(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
     if not look:
@@ -191,11 +190,6 @@ def _boxed(design: Design) -> tuple[sl.Robot, sl.Plan]:
         if sl.inverse(robot, level_grid(box, GRID)).feasible.mean() >= NEARLY_ALL:
             return robot.replace(test_box=box), middle
     return robot, middle
-
-
-def _header(said: dict[str, str]) -> str:
-    made = ", ".join(f"{key} {' '.join(value.split())}" for key, value in said.items())
-    return f"# made by sagline new: {made}\n# values in SI units; a quantity may also have its unit, 22 mm^2\n"
 
 
 def _explained(robot: sl.Robot, design: Design, middle: sl.Plan) -> tuple[list[str], float]:

@@ -39,13 +39,6 @@ METHODS: Final = tuple(word_of(name) for name in ordered_names("sagline.tension"
 TENSIONS: Final = tuple(name for name in METHODS if name != "quadratic-program")
 
 
-def model_named(name: str) -> sl.CableModel:
-    """The model of the option `--model`, with its default constants."""
-    from sagline.cables.models import model_of
-
-    return model_of(name)
-
-
 def tension_named(name: str, variable: Any = "chord") -> sl.TensionMethod:
     """The method of the option `--tension` with a tension variable."""
     from sagline.tension.methods import methods_by_name

@@ -39,13 +39,11 @@ class _StatusLine:
         self._next, self._size = 0.0, (0, 0)
 
     def __enter__(self) -> Self:
-        """Exclude the last line from scrolling."""
         if self._shown:
             self._fit()
         return self
 
     def __exit__(self, *failure: object) -> None:
-        """Let the whole terminal scroll again."""
         if self._shown:
             _, rows = self._size
             self._say(f"\x1b7\x1b[r\x1b[{rows};1H\x1b[2K\x1b8")
@@ -62,12 +60,10 @@ class _StatusLine:
         self._say(f"\x1b7\x1b[{rows};1H\x1b[7m{shown.ljust(columns - 1)}\x1b[0m\x1b8")
 
     def ask(self) -> None:
-        """Show the prompt."""
         if self._shown:
             self._say(f"\r\x1b[K{PROMPT}")
 
     def clear(self) -> None:
-        """Remove the prompt."""
         if self._shown:
             self._say("\r\x1b[K")
 
@@ -91,8 +87,8 @@ class OperatorSession:
 
     def __init__(self, controller: sl.control.Controller, *, alone: bool, shadow: bool) -> None:
         """Prepare a session. If `alone`, a line waits until the previous line is done. If `shadow`, nothing is sent."""
-        control = controller
-        self.control, self._alone, self._shadow = controller, alone, shadow
+        self.control = control = controller
+        self._alone, self._shadow = alone, shadow
         self._event_count = 0
         self._ended = self._is_interrupted = False
         self._wait = 0  # number of cycles until the next line is read
@@ -104,7 +100,7 @@ class OperatorSession:
                 "[X,Y,Z[,A,B,C]] | --confirm",
                 "set the lengths at this pose, by default the middle of the test box; or confirm the last pose",
                 self._home_pose,
-                self._home,
+                lambda pose: control.confirm_homing() if pose is None else control.home(pose),
             ),
             "goto": ("X,Y,Z[,A,B,C]", "move straight to a pose [m, degrees]", partial(_pose, "goto"), self._go_to),
             "run": ("FILE", "follow a path, path.yaml", sl.load_path, control.start),
@@ -112,7 +108,7 @@ class OperatorSession:
                 "WINCH|AXIS LENGTH",
                 "jog 3 +5mm: winch 3 (the first is 0); jog z -10mm: the platform",
                 self._jog,
-                _call,
+                lambda action: action(),
             ),
             "pause": ("", "pause the path", _nothing, control.pause),
             "resume": ("", "resume the path", _nothing, control.resume),
@@ -237,20 +233,13 @@ class OperatorSession:
             return None
         return _pose("home", text) if text else opt.middle_pose(self.control.robot)
 
-    def _home(self, pose: sl.Pose | None) -> None:
-        if pose is None:
-            self.control.confirm_homing()
-        else:
-            self.control.home(pose)
-
     def _jog(self, text: str) -> Callable[[], None]:
         which, _, far = text.partition(" ")
         by = quantity(far, "jog: LENGTH", "m")
         if which in AXES:
             return partial(self.control.start_jog_platform, [by * (axis == which) for axis in AXES])
-        return partial(
-            self.control.start_jog, opt.whole_of(which, "jog: WINCH", 0, self.control.robot.cable_count - 1), by
-        )
+        winch = opt.whole_of(which, "jog: WINCH", 0, self.control.robot.cable_count - 1)
+        return partial(self.control.start_jog, winch, by)
 
     def _cycles(self, text: str) -> int:
         return round(quantity(text, "wait", "s", low=0.0) / self.control.period)
@@ -313,10 +302,6 @@ def _tensions(filtered: Array) -> str:
     lost = [f"no reading of cell {cell}" for cell in np.flatnonzero(~read)]
     known = [f"{filtered[read].min():.0f} to {filtered[read].max():.0f} N"] if read.any() else []
     return ", ".join((*known, *lost))
-
-
-def _call(action: Callable[[], object]) -> None:
-    action()
 
 
 def _nothing(text: str) -> None:

@@ -45,9 +45,8 @@ def tension(
     place = opt.middle_pose(robot) if pose is None else pose
     drawn = files.figures and robot.cable_count == robot.degrees_of_freedom + 2
     output = Output(files, file_stem(robot.name), (), ["-tension"] * drawn, TABLE)
-    least = sl.inverse(
-        robot, place, model, sl.MinimumNorm(variable), wrench
-    )  # raises an error if no method is defined for the robot
+    # raises an error if no method is defined for the robot
+    least = sl.inverse(robot, place, model, sl.MinimumNorm(variable), wrench)
     fewer_cables = is_underconstrained(robot)
     plans: dict[str, sl.Plan | None] = {"balance": least}
     if not fewer_cables:

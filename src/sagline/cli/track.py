@@ -37,8 +37,8 @@ def track(
     uncertainty: bool = opt.flag(
         False,
         "Errors of poses and tensions due to the robot's tolerances.",
-        "--uncertainty",
         opt.only_without("--base"),
+        "--uncertainty",
     ),
     bases: list[str] | None = opt.BASES,
     files: opt.Files = opt.Files(),
@@ -57,9 +57,11 @@ def track(
         sagline track cogiro own_samples.csv --payload 20 --csv
         sagline track cogiro own_path.yaml --base ship.yaml=0,1,2,3
     """
+    from sagline.cables.models import model_of
+
     machine = opt.robot_with_payload(robot, payload)
     way = sl.article_path() if path is None else load_path_near(machine, path)
-    cable, anchors = opt.model_named(model), anchors_of(machine, bases)
+    cable, anchors = model_of(model), anchors_of(machine, bases)
     if uncertainty:  # refuse missing tolerances before any other work
         sl.inverse(machine, way.pose[:1], cable).uncertainty()
     tables = (".csv", "-uncertainty.csv")[: 1 + uncertainty]
@@ -130,9 +132,8 @@ WIDE, NARROW = 30, 16  # largest widths of the names of robot and tension method
 LONGEST = "unstrained_length_max_m"  # size relative to which a position error is rounding
 MOST_GAPS = 5  # largest number of infeasible parts of a path that are printed
 WIDEN = " Move the path, or widen the tension limits."
-SAME_PLACE = (
-    1e-6  # [m], far above the rounding errors of an equilibrium, and far below its distance from a second equilibrium
-)
+# [m], far above the rounding errors of an equilibrium, and far below its distance from a second equilibrium
+SAME_PLACE = 1e-6
 
 
 class ConfirmedRun(NamedTuple):

@@ -310,14 +310,9 @@ def serve(
     from sagline.viewer.page import Page
 
     refuse_slanted(robot)
-    server = web.start_server(
-        address.host,
-        address.port,
-        robot.name,
-        token=address.token,
-        clients=address.clients,
-        allow_host=address.allow_host or (),
-    )
+    names = address.allow_host or ()
+    where = address.host, address.port, robot.name
+    server = web.start_server(*where, token=address.token, clients=address.clients, allow_host=names)
     stopping = threading.Event()
 
     def stop(number: int, frame: FrameType | None) -> None:

@@ -126,7 +126,6 @@ def workspace(
     """
     from sagline.workspaces.proof import check_provable
 
-    cable = opt.model_named(model)
     if tilt > pi:  # a number without unit is in radians, but the user may have meant degrees
         step = "Give the angle with its unit, --tilt 10deg; it cannot be more than half a turn."
         raise sl.InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
@@ -137,12 +136,12 @@ def workspace(
     if to_prove is not None:
         check_provable(robot)
     with working(f"{robot.name}: workspace") as line:
-        how: dict[str, Any] = {"model": cable, "cells": cells, "hull": hull, "progress": line.progress}
+        how: dict[str, Any] = {"model": model, "cells": cells, "hull": hull, "progress": line.progress}
         space = sl.workspace(robot, box, loads, orientations=sl.Tilts(tilt), criteria=criteria, given=given, **how)
         proof = None
         if to_prove is not None:
             stage, inside = line.stage(f"{robot.name}: proof"), sl.PoseBox(to_prove.low, to_prove.high, tilt)
-            proof = sl.prove(robot, inside, loads, budget=budget, model=cable, progress=stage)
+            proof = sl.prove(robot, inside, loads, budget=budget, model=model, progress=stage)
         _write(space, output, line)
     verdict = str(space).partition("\n")[0]
     output.report(lambda: _record(space, proof), verdict, lambda: _tell(space, proof))

@@ -99,14 +99,10 @@ class CutFeature(Feature):
             self._mass = gui.add_dropdown("Cables in motion", tuple(CABLE_MASS), hint=hint)
             button = gui.add_button("Cut", icon=viser.Icon.SCISSORS)
             self._text = gui.add_html(HELP)
-        self._undo: Any = gui.add_button(
-            "Undo cut",
-            icon=viser.Icon.ARROW_BACK_UP,
-            visible=False,
-            order=TOP,
-            hint="Restore the state before the cut.",
-        )
-        self._button: Any = gui.add_button("Cut", icon=viser.Icon.SCISSORS, visible=False, order=TOP)
+        hidden: dict[str, Any] = {"visible": False, "order": TOP}
+        hint = "Restore the state before the cut."
+        self._undo: Any = gui.add_button("Undo cut", icon=viser.Icon.ARROW_BACK_UP, hint=hint, **hidden)
+        self._button: Any = gui.add_button("Cut", icon=viser.Icon.SCISSORS, **hidden)
         self._cable.on_update(lambda event: page.later(self._mark) if event.client is not None else None)
         self._undo.on_click(lambda _: page.later(self.undo))
         for each in (button, self._button):

@@ -200,11 +200,8 @@ class ProofFeature(Feature):
         """Build the tab."""
         self._page, self._nodes = page, Nodes(page.server.scene)
         with page.panel.readings.add_tab("Proof"):
-            self._wanted: Any = page.server.gui.add_checkbox(
-                "Forces in the scene",
-                False,
-                hint="Arrows at the platform; the longest arrow always has the same length.",
-            )
+            hint = "Arrows at the platform; the longest arrow always has the same length."
+            self._wanted: Any = page.server.gui.add_checkbox("Forces in the scene", False, hint=hint)
             self._html = page.server.gui.add_html("")
         page.refresh_on(self._wanted)
 
