@@ -152,7 +152,6 @@ class _TwinMonitor:
     """Observer that prints changes of the PLCs and records the motion of the platform."""
 
     def __init__(self, machine: sl.twin.Machine) -> None:
-        """Begin with the present state of `machine`."""
         self.recorder: Recorder | None = None
         self._stopped = ""
         self._machine = machine

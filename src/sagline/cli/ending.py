@@ -21,18 +21,10 @@ REPORT = "the authors of sagline"
 
 
 def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bool = False) -> int:
-    """Run a command and turn every error into one message and an exit code.
-
-    Args:
-        command: The work; returns the exit code, None for 0.
-        debug: True if the traceback of an error is printed before its message.
-        last: True if the process ends after the command. Ctrl-C then has no effect while the process ends.
-
-    Returns:
-        The exit code of the command. For an error, the code is BAD_INPUT if sagline or the system raised it, and
-        UNEXPECTED for a mistake in the program. The code is INTERRUPTED for Ctrl-C, even if Python lost the interrupt,
-        143 for SIGTERM, 129 for SIGHUP, and CUT_OFF if the reader of the output has closed the pipe.
-    """
+    """Run a command, which returns its exit code or None for 0, and turn an error into one message and an exit code."""
+    # The code is BAD_INPUT for an error of sagline or of the system, UNEXPECTED for a mistake in the program,
+    # INTERRUPTED for Ctrl-C, even if Python lost the interrupt, 143 for SIGTERM, 129 for SIGHUP, and CUT_OFF if the
+    # reader of the output has closed the pipe. `last`: the process ends after the command; Ctrl-C then has no effect.
     interrupts = _Interrupts()
     code = UNEXPECTED
     try:
@@ -153,13 +145,11 @@ def _give_up_unwritable() -> None:
 
 
 class _Interrupts:
-    """Handler of Ctrl-C, SIGTERM and SIGHUP in the main thread. A signal that the process ignores stays ignored.
+    """Handler of Ctrl-C, SIGTERM and SIGHUP in the main thread. A signal that the process ignores stays ignored."""
 
-    SIGTERM and SIGHUP have the same effect as Ctrl-C. A controller, for instance, stops its robot before it ends.
-    """
+    # SIGTERM and SIGHUP have the same effect as Ctrl-C. A controller, for instance, stops its robot before it ends.
 
     def __init__(self) -> None:
-        """Install the handler."""
         self.received = 0  # number of the signal
         self._before: dict[int, Any] = {}
         self._hook = sys.unraisablehook
@@ -179,12 +169,10 @@ class _Interrupts:
         pressed(signal.SIGINT, frame)
 
     def ignore(self) -> None:
-        """Ignore the handled signals from now on."""
         for number in self._before:
             signal.signal(number, signal.SIG_IGN)
 
     def restore(self) -> None:
-        """Restore the previous handlers."""
         sys.unraisablehook = self._hook
         for number, before in self._before.items():
             signal.signal(number, before)

@@ -74,11 +74,9 @@ class _Formatter(cast(Any, typer.Context.formatter_class)):  # type: ignore[misc
     """Formatter of help texts. It does not break lines at the hyphens of names."""
 
     def write_dl(self, rows: Sequence[tuple[str, str]], *more: Any, **extra: Any) -> None:
-        """Write a list of options or commands."""
         super().write_dl([(name, text.replace("-", HYPHEN)) for name, text in rows], *more, **extra)
 
     def write_text(self, text: str) -> None:
-        """Write a paragraph."""
         super().write_text(text.replace("-", HYPHEN))
 
     def getvalue(self) -> str:
@@ -87,13 +85,9 @@ class _Formatter(cast(Any, typer.Context.formatter_class)):  # type: ignore[misc
 
 
 class _Command(TyperCommand):
-    """A subcommand. It rejects empty arguments and options without effect. Its help shows arguments without braces.
+    """A subcommand. It rejects empty arguments and options without effect. Its help shows arguments without braces."""
 
-    Attributes:
-        conditions: For each parameter, conditions on other options, which must be given or must be missing.
-    """
-
-    conditions: Mapping[str, Sequence[Condition]]
+    conditions: Mapping[str, Sequence[Condition]]  # for each parameter, other options that must be given or missing
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse `args`. Empty texts are rejected, because an empty path would mean the current folder."""
@@ -124,7 +118,6 @@ class _Command(TyperCommand):
                     raise InvalidValueError(label, f"given {word} {name}", allowed, step)
 
     def get_help(self, ctx: Any) -> str:
-        """The help."""
         ctx.formatter_class = _Formatter
         usage, _, rest = super().get_help(ctx).partition("\n\n")
         rest = re.sub(
@@ -137,17 +130,14 @@ class _Commands(Mapping[str, _Command]):
     """The subcommands by name. Reading a subcommand imports its module."""
 
     def __getitem__(self, name: str) -> _Command:
-        """The subcommand of a name."""
         if name not in NAMES:
             raise KeyError(name)
         return _load_command(name)
 
     def __iter__(self) -> Iterator[str]:
-        """Names, in the order of the help."""
         return iter(NAMES)
 
     def __len__(self) -> int:
-        """Number of subcommands."""
         return len(NAMES)
 
 
@@ -160,7 +150,6 @@ class _Group(TyperGroup):
         self.commands: Any = _Commands()
 
     def get_help(self, ctx: Any) -> str:
-        """The help."""
         ctx.formatter_class = _Formatter
         return str(super().get_help(ctx))
 

@@ -136,15 +136,9 @@ class Output:
     def __init__(
         self, given: Files, stem: str, parts: Iterable[str] = (), figures: Sequence[str] = (), *tables: str
     ) -> None:
-        """Check that all files can be written.
-
-        Args:
-            given: Options. `given.folder` may be the path of the first file. Its stem then replaces `stem`.
-            stem: Beginning of all names. If it is "", `given.folder` must be a folder.
-            parts: For each file that is always written, the end of its name with the suffix.
-            figures: For each figure, the end of its name without suffix.
-            tables: For each table, the end of its name with the suffix.
-        """
+        """Check that all files can be written. `parts`, `figures` and `tables` are the ends of their names."""
+        # `given.folder` may be the path of the first file, whose stem then replaces `stem`, the beginning of all names;
+        # if `stem` is "", it must be a folder. Only the ends of the names of figures are without suffix.
         self._given, self._stem, self._main = given, stem, dict[str, str]()  # name of the first file, if it is given
         self.folder, self.files = given.folder, list[Path]()
         self._figures = list(figures) if given.figures else []

@@ -40,10 +40,8 @@ def ratio(text: str, item: str) -> float:
 
 
 def wrenches_of(text: str, item: str) -> sl.WrenchSet:
-    """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]".
-
-    A single force, moment or acceleration holds for all axes. Three forces or moments hold for x, y and z.
-    """
+    """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]"."""
+    # a single force, moment or acceleration holds for all axes; three forces or moments hold for x, y and z
     if len(text) > _LONGEST or not _SIGN.match(text):
         if "±" in text or len(text) > _LONGEST:
             raise sl.InvalidValueError(item, repr(text), "all with ±, or all without", _STEP)

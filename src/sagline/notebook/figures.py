@@ -185,10 +185,8 @@ def _ink(gray: re.Match[str]) -> str:
 
 
 def _themed(svg: str, description: str) -> str:
-    """Convert a drawing to the colors of the page: black becomes the text color, gray a transparent text color.
-
-    The identifiers are made unique, so that one page can contain several drawings.
-    """
+    """Convert a drawing to the colors of the page: black becomes the text color, gray a transparent text color."""
+    # the identifiers are made unique, so that one page can contain several drawings
     svg = _family.sub("", _remarks.sub("", svg)).strip()
     svg = _gray.sub(_ink, svg)
     svg = sheets.unique_names(svg, f"s{sha1(svg.encode()).hexdigest()[:8]}-")

@@ -63,7 +63,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
         The figure.
 
     Raises:
-        InvalidValueError: If `found` is not a calibration. If `part` does not exist.
+        InvalidValueError: If `part` does not exist.
 
     Examples:
         >>> import sagline as sl

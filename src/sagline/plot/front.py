@@ -28,9 +28,6 @@ def front(front: Front) -> Figure:
     Returns:
         The figure.
 
-    Raises:
-        InvalidValueError: If `front` is not a front.
-
     Examples:
         >>> import sagline as sl
         >>> figure = sl.plot.front(sl.load_front("front"))  # doctest: +SKIP

@@ -51,8 +51,7 @@ def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None
     Examples:
         >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
-        >>> axes = sl.plot.tensions(plan)
+        >>> axes = sl.plot.tensions(sl.inverse(sl.load_robot("cogiro"), path))
     """
     ax = sheet.axes_or_new(ax)
     _draw_cables(ax, plan, quantity, TENSIONS)
@@ -77,8 +76,7 @@ def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = N
     Examples:
         >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
-        >>> axes = sl.plot.lengths(plan)
+        >>> axes = sl.plot.lengths(sl.inverse(sl.load_robot("cogiro"), path))
     """
     ax = sheet.axes_or_new(ax)
     _draw_cables(ax, plan, quantity, LENGTHS)
@@ -98,8 +96,7 @@ def overview(plan: Plan) -> Figure:
     Examples:
         >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
-        >>> figure = sl.plot.overview(plan)
+        >>> figure = sl.plot.overview(sl.inverse(sl.load_robot("cogiro"), path))
     """
     rows, columns, height = (4, 1, 9.0) if current().narrow else (2, 2, 5.0)
     figure = sheet.sheet(height)
@@ -175,7 +172,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         A figure with one panel per confirmation, with the robot as its title.
 
     Raises:
-        InvalidValueError: If no confirmation is given. If an argument is not a confirmation.
+        InvalidValueError: If no confirmation is given.
 
     Examples:
         >>> import sagline as sl
@@ -243,8 +240,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
     Examples:
         >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), path)
-        >>> figure = sl.plot.small_multiples(plan)
+        >>> figure = sl.plot.small_multiples(sl.inverse(sl.load_robot("cogiro"), path))
     """
     values, label = _values(plan, quantity, TENSIONS | LENGTHS)
     (clock, axis), robot, count = abscissa(plan), plan.robot, values.shape[1]

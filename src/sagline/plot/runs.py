@@ -67,13 +67,11 @@ def simulation(simulation: Simulation) -> Figure:
 def energy(simulation: Simulation) -> Figure:
     """Energies over time: kinetic, potential, supplied and lost. A lower panel shows the error of the energy balance.
 
-    The curve of the potential energy is the change from the initial value.
-
     Args:
         simulation: The simulation.
 
     Returns:
-        A figure of two panels.
+        A figure of two panels. The curve of the potential energy is the change from the initial value.
 
     Examples:
         >>> import sagline as sl
@@ -136,9 +134,6 @@ def execution(done: Execution) -> Figure:
 
     Returns:
         A figure of four panels.
-
-    Raises:
-        InvalidValueError: If `done` is not an execution.
 
     Examples:
         >>> import sagline as sl

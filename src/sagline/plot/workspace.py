@@ -269,9 +269,6 @@ def workspace(space: Workspace) -> Figure:
     Returns:
         The figure.
 
-    Raises:
-        InvalidValueError: If `space` is not a workspace.
-
     Examples:
         >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")

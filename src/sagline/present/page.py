@@ -114,11 +114,7 @@ def page(
 
 
 def write_page(folder: Path | str, names: tuple[str, str], text: str, numbers: dict[str, Any]) -> tuple[Path, Path]:
-    """Write the page `text`, and its `numbers` as JSON, to `folder` (created if missing). Both or none are written.
-
-    Raises:
-        FileError: If the folder cannot be written.
-    """
+    """Write the page `text`, and its `numbers` as JSON, to `folder` (created if missing). Both or none are written."""
     place = create_folder(folder)
     with atomic_files(place, names) as (page_file, numbers_file):
         page_file.write_text(text, encoding="utf-8")

@@ -136,10 +136,8 @@ def _why(gap: Gap) -> str:
 
 
 def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
-    """Chord tensions (N, m) of catenaries at rest. `length`: lengths off the drum; NaN and too short lengths give NaN.
-
-    Cables leave their pulleys along the chord.
-    """
+    """Chord tensions (N, m) of catenaries at rest, from lengths off the drum; NaN if a length is too short or NaN."""
+    # cables leave their pulleys along the chord
     found = chord_geometry(robot, pose)
     chord, sine, cosine = (np.asarray(found[:, row]) for row in (geometry.CHORD, geometry.SINE, geometry.COSINE))
     radius, entry = pulleys_of(robot)

@@ -43,11 +43,9 @@ def page_script() -> str:
 
 
 def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) -> dict[str, Any]:
-    """Description of calls: addresses of all arrays, contents of write-protected arrays, and arguments in C.
-
-    `calls`: calls by the name of the function in the page. `names`: arrays or contiguous views that the page uses.
-    Arrays that are not write-protected contain zeros at the start.
-    """
+    """Description of calls: addresses of all arrays, contents of write-protected arrays, and arguments in C."""
+    # `calls`: calls by the name of the function in the page. `names`: arrays or contiguous views that the page uses.
+    # Arrays that are not write-protected contain zeros at the start.
     places: dict[int, int] = {}  # addresses of the arrays that own memory, by identity
     filled: dict[int, str] = {}
     size = 0

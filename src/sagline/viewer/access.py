@@ -1,8 +1,8 @@
 """Access to a page: the hosts and origins of requests, the token of the address, and limits for clients.
 
-A page of another site in the browser of a user can send requests to this computer. The browser names the other site in
-the header Origin. If the domain of the other site leads to this computer (DNS rebinding), the header Host contains this
-domain.
+A page of another site in the browser of a user can send requests to this computer. The browser names the other site
+in the header Origin. If the domain of the other site leads to this computer (DNS rebinding), the header Host contains
+this domain.
 """
 
 from __future__ import annotations

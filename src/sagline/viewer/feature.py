@@ -40,10 +40,7 @@ class View:
 
 
 class Feature:
-    """Base of a feature of the page: its controls, drawing, text and reactions. The base does nothing.
-
-    A feature is created once, with the `Page`. The serving thread calls all its methods.
-    """
+    """Base of a feature of the page, which does nothing. The serving thread calls all methods of a feature."""
 
     # True if the feature follows every view of a drag that changes its key, unless the key is None, because it draws at
     # the pose. Others follow up to 20 views per second.

@@ -144,22 +144,9 @@ def start_server(
     clients: int = CLIENTS,
     allow_host: Sequence[str] = (),
 ) -> PageServer:
-    """Start a server.
-
-    Args:
-        host: Address to listen on; "0.0.0.0" for all addresses.
-        port: Port to listen on; 0 for any free port.
-        title: Title of the page.
-        token: True if only requests with the token of the address are answered; False only on a trusted host.
-        clients: Largest number of open pages.
-        allow_host: Further names of this computer, or of a proxy before it, in the addresses of browsers.
-
-    Raises:
-        InvalidValueError: If the port is in use or the address does not belong to this computer; viser itself would
-            take the next port or wait forever. Also if another argument is not allowed, or if the installed viser does
-            not permit the check of requests.
-    """
-    _check(host, port)
+    """Start a server on an address and a port (0: any free port); options as those of `sagline view`."""
+    # `allow_host`: further names of this computer, or of a proxy before it, in the addresses of browsers
+    _check(host, port)  # viser itself would take the next port or wait forever
     access = Access(host, token=token, clients=clients, allow_host=allow_host)
     with ExitStack() as quiet:
         if not _running:

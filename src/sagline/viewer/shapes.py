@@ -295,12 +295,8 @@ THINNEST: Final = 0.03  # smallest axis of a drawn ellipsoid, relative to its lo
 
 
 def error_ellipsoids(covariance: Array) -> tuple[Indices, Array, Array]:
-    """Error ellipsoids of the points with known nonzero errors, from `covariance` (N, 3, 3) [m^2].
-
-    Returns:
-        Indices of these points, shape (k,); standard errors along the axes [m], shape (k, 3); and the axes, one per
-        column, shape (k, 3, 3).
-    """
+    """Error ellipsoids of the points with known nonzero errors, from `covariance` (N, 3, 3) [m^2]."""
+    # indices of these points (k,), standard errors along the axes [m], (k, 3), and the axes, one per column, (k, 3, 3)
     which = np.flatnonzero(np.isfinite(covariance).all(axis=(1, 2)) & covariance.any(axis=(1, 2))).astype(np.int64)
     squares, axes = np.linalg.eigh(covariance[which])
     return which, np.sqrt(np.maximum(squares, 0.0)), axes

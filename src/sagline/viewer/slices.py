@@ -72,15 +72,11 @@ Marks: TypeAlias = list[tuple[str, Array]]  # labels and their positions [m], sh
 
 
 def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> tuple[NDArray[np.uint8], Array, Array, Marks]:
-    """Drawing of a slice.
-
-    Returns:
-        Red, green, blue and opacity, with the lowest row first, shape (h, w, 4); segments of the line where the margin
-        is 0, in the world [m], shape (b, 2, 3); segments at the borders of the other bands, shape (s, 2, 3); labels.
-    """
-    margin = np.clip(
-        cut.margin, scale.edges[0] - scale.step, scale.edges[-1] + scale.step
-    )  # infinite margins have contours
+    """Picture of a slice, lines where its margin is 0, lines at the borders of the other bands, and labels."""
+    # the picture has red, green, blue and opacity, with the lowest row first, shape (h, w, 4); lines are segments in
+    # the world [m], shape (s, 2, 3)
+    low, high = scale.edges[0] - scale.step, scale.edges[-1] + scale.step
+    margin = np.clip(cut.margin, low, high)  # infinite margins have contours
     fine = _finer(_finer(margin).T).T
     opacity = np.where(fine >= 0.0, INSIDE_OPACITY, OUTSIDE_OPACITY).astype(np.uint8)
     found = contour_generator(cut.across, cut.up, margin, line_type=LineType.ChunkCombinedOffset)

@@ -35,12 +35,10 @@ BY_HAND: Final = "chosen by hand"
 
 
 class ByHand(QuadraticProgram):
-    """Feasible tensions that are closest to tensions chosen by hand; at the pose of the choice, both are equal.
+    """Feasible tensions that are closest to tensions chosen by hand; at the pose of the choice, both are equal."""
 
-    Tensions in force balance are the minimum-norm tensions plus a point of the null space. The sag forces shift the
-    minimum-norm tensions slightly, but they do not shift this point. At other poses, the tensions are as close to the
-    chosen tensions as the balance and the limits allow.
-    """
+    # Tensions in force balance are the minimum-norm tensions plus a point of the null space. The sag forces shift the
+    # minimum-norm tensions slightly, but they do not shift this point.
 
 
 MODEL_NAMES: dict[type[CableModel], str] = {  # names that are clearer than the class names

@@ -65,7 +65,6 @@ class _NumberedLevels(Levels):
     numbers: Indices  # number of each remaining cable, then -1 for no cable
 
     def details(self, positions: Array) -> Details:
-        """Details with the numbers of the whole robot."""
         found = super().details(positions)
         return found._replace(cable=self.numbers[found.cable])
 

@@ -117,11 +117,9 @@ class _LinkedControls:
         return lambda: self.put(values)
 
     def values(self) -> dict[str, Any]:
-        """Values of all controls by their names."""
         return {name: handle.value for name, handle in self._handles().items()}
 
     def put(self, values: dict[str, Any]) -> None:
-        """Set the named controls."""
         for name, handle in self._handles().items():
             if name in values:
                 handle.value = values[name]
