@@ -129,7 +129,7 @@ def test_a_file_that_is_no_log_is_not_awaited(tmp_path: Path, said: bytes | None
     file = tmp_path / "run.mcap"
     file.mkdir() if said is None else file.write_bytes(said)
     with refused(kind=sl.FileError, file=file):
-        view._view_log(file, None, NOWHERE, live=True)
+        view._view_log(file, None, NOWHERE, live=True, truth=None)
 
 
 @extended
@@ -165,7 +165,7 @@ def test_a_log_is_followed_before_it_exists(tmp_path: Path, monkeypatch: pytest.
     writer = threading.Thread(target=write)
     monkeypatch.setattr("sagline.cli.view.serve", serve)
     writer.start()
-    assert view._view_log(file, None, NOWHERE, live=True) == 0
+    assert view._view_log(file, None, NOWHERE, live=True, truth=None) == 0
     writer.join()
     assert lengths == sorted(lengths)  # equal if an event arrived, or if a cycle was split
     assert lengths[-1] == 200

@@ -15,7 +15,7 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import Damping, VibrationStatus, plot
 from sagline.dynamics.vibration.vibration import ListedMode
-from sagline.plot.film import _energy_shares
+from sagline.plot.dynamics import _energy_shares
 from tests.plot import made
 from tests.refusal import refused
 from tests.tiers import extended

@@ -48,7 +48,7 @@ def run(files: opt.Files = opt.Files()) -> int:
     path, runs = sl.article_path(), []
     with working("planning the article's path, and confirming it with exact cables") as line:
         for robot in robots:
-            runs += [ConfirmedRun.along(robot, path, model, tension, line) for model in models]
+            runs += [ConfirmedRun.along(robot, path, line, model=model, tension=tension) for model in models]
     with working("workspaces of both robots") as line:
         spaces = [sl.workspace(robot, cells=CELLS, progress=line.progress) for robot in robots]
     with working("writing runs, hulls and figures"):

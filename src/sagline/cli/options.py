@@ -1,7 +1,7 @@
 """Arguments and options of the subcommands: their declaration, and the options that several commands have.
 
-A declaration is the default value of a parameter, `cells: int = opt.option(32, "NUMBER", "Cells of the grid.")`, or
-of a field of a dataclass. A parameter whose type is such a dataclass is replaced by its fields.
+A declaration is the default value of a parameter, `cells: int = opt.option(32, "NUMBER", "Cells of the grid.")`, or of
+a field of a dataclass. A parameter whose type is such a dataclass is replaced by its fields.
 """
 
 from __future__ import annotations

@@ -67,7 +67,8 @@ def track(
     tables = (".csv", "-uncertainty.csv")[: 1 + uncertainty]
     output = Output(files, run_name(machine, cable), [".nc"], [f"-{figure}" for figure in FIGURES], *tables)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses") as line:
-        run = ConfirmedRun.along(machine, way, cable, opt.tension_named(tension, variable), line, wrench, anchors)
+        how = {"model": cable, "tension": opt.tension_named(tension, variable), "wrench": wrench}
+        run = ConfirmedRun.along(machine, way, line, anchors, **how)
         run = run._replace(uncertainty=run.plan.uncertainty() if uncertainty else None)
     with working("writing"):
         run.plan.save(output.file(".nc"))
@@ -158,21 +159,13 @@ class ConfirmedRun(NamedTuple):
 
     @classmethod
     def along(
-        cls,
-        robot: sl.Robot,
-        path: sl.Path,
-        model: sl.CableModel,
-        tension: sl.TensionMethod,
-        line: ProgressLine,
-        wrench: Array | None = None,
-        anchors: sl.AnchorMotion | None = None,
+        cls, robot: sl.Robot, path: sl.Path, line: ProgressLine, anchors: sl.AnchorMotion | None = None, **how: Any
     ) -> ConfirmedRun:
-        """Plan a path, and confirm the plan with exact cables."""
-        # load the compiled kernels before the time is measured
-        sl.inverse(robot, path.pose[:1], model, tension, wrench)
+        """Plan a path, and confirm the plan with exact cables. `how`: model, tension and wrench as in `inverse`."""
+        sl.inverse(robot, path.pose[:1], **how)  # load the compiled kernels before the time is measured
         start = perf_counter()
         progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
-        plan = sl.inverse(robot, path, model, tension, wrench, anchors=anchors, progress=progress)
+        plan = sl.inverse(robot, path, anchors=anchors, progress=progress, **how)
         seconds = perf_counter() - start
         return cls(sl.confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
 

@@ -154,32 +154,26 @@ def _view_calibration(file: Path, robot: str | None, address: ServerOptions) -> 
 
 
 def _view_log(
-    file: Path,
-    robot: str | None,
-    address: ServerOptions,
-    *,
-    live: bool = False,
-    truth: Path | None = None,
-    beside: Path | None = None,
+    log: Path, robot: str | None, address: ServerOptions, *, live: bool, truth: Path | None, beside: Path | None = None
 ) -> int:
     """Serve the page of a log until Ctrl-C. If `live`, the page follows a growing log. Returns the exit code."""
     Source = _viewer()
     from sagline.viewer.session import LogFollower
 
-    follower = LogFollower(file, truth)
-    with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
-        session = _first_session(follower, [log for log in (file, truth) if log is not None], live=live)
+    follower = LogFollower(log, truth)
+    with working(f"waiting for {log.name}" if live else f"reading {log.name}"):
+        session = _first_session(follower, [each for each in (log, truth) if each is not None], live=live)
     if robot is not None:
-        _check_robot(file, "log", session.robot, sl.load_robot(robot), alone=True)
-    other = None if beside is None else _played_beside(session.robot, file, beside)
+        _check_robot(log, "log", session.robot, sl.load_robot(robot), alone=True)
+    other = None if beside is None else _played_beside(session.robot, log, beside)
     if not live and not follower.log.complete:
-        show_note("Note: ", f"{file} was cut off: its last second is missing.", style="bold")
+        show_note("Note: ", f"{log} was cut off: its last second is missing.", style="bold")
     return serve(
         session.robot,
         address,
         meanwhile=lambda viewer: _following(follower, viewer) if live else nullcontext(),
         played=session,
-        source=Source.of_file("execution", file),
+        source=Source.of_file("execution", log),
         beside=other,
     )
 

@@ -2,10 +2,10 @@
 
 from .calibration import calibration as calibration
 from .drawing import drawing as drawing
+from .dynamics import film as film
 from .dynamics import frequencies as frequencies
 from .dynamics import frequency_map as frequency_map
 from .dynamics import response as response
-from .film import film as film
 from .front import front as front
 from .plan import error as error
 from .plan import errors as errors

@@ -1,8 +1,8 @@
 """Access to a page: the hosts and origins of requests, the token of the address, and limits for clients.
 
-A page of another site in the browser of a user can send requests to this computer. The browser names the other site
-in the header Origin. If the domain of the other site leads to this computer (DNS rebinding), the header Host contains
-this domain.
+A page of another site in the browser of a user can send requests to this computer. The browser names the other site in
+the header Origin. If the domain of the other site leads to this computer (DNS rebinding), the header Host contains this
+domain.
 """
 
 from __future__ import annotations
@@ -40,8 +40,12 @@ Answer = Callable[[ServerConnection, Request], Response | None]
 class Access:
     """Access to the page of a server."""
 
-    def __init__(self, host: str, *, token: bool, clients: int, allow_host: Sequence[str]) -> None:
-        """Make a token; the arguments are those of `start_server`."""
+    def __init__(
+        self, host: str, *, token: bool = True, clients: int = CLIENTS, allow_host: Sequence[str] = ()
+    ) -> None:
+        """Make a token, unless every request is answered, which only a trusted host permits."""
+        # host: the address on which the server listens; clients: largest number of open pages
+        # allow_host: further names of this computer, or of a proxy before it, in the addresses of browsers
         self._clients = whole_number(clients, "clients", 1, MOST_CLIENTS)
         # path: first part of the path of every address, a slash and the token; "" without a token
         self.path = f"/{secrets.token_urlsafe(_ENTROPY)}" if flag(token, "token") else ""

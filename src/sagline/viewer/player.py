@@ -54,13 +54,7 @@ class InMotion:
         """Points of the cables from frame anchor to platform end (m, P, 3), NaN between pieces of a broken cable."""
         if self.nodes is not None:
             return shapes.resampled(self.nodes, shapes.points_per_cable(self.robot))
-        courses = self._catenaries(sag_scale)
-        # a broken cable without mass is drawn as a point
-        courses[self.broken] = self.robot.frame_anchors[self.broken, None]
-        return courses
-
-    def _catenaries(self, sag_scale: float) -> Array:
-        """Points of catenaries with the cables' lengths. The exit points are the same as for chords."""
+        # catenaries with the cables' lengths; the exit points are the same as for chords
         robot, pose = self.robot, self.pose
         wraps = shapes.wraps(robot, pose, None)
         ends = shapes.chords(robot, pose, wraps[:, -1])
@@ -73,7 +67,9 @@ class InMotion:
         length = np.where(length > 0.0, length, np.hypot(span, rise))
         cables = Catenary().from_length(robot.cables, span, rise, length, robot.gravity)
         free = shapes.catenaries(ends, cables, sag_scale)
-        return free if wraps.shape[1] == 1 else np.concatenate((wraps, free), axis=1)
+        courses = free if wraps.shape[1] == 1 else np.concatenate((wraps, free), axis=1)
+        courses[self.broken] = robot.frame_anchors[self.broken, None]  # a broken cable without mass is drawn as a point
+        return courses
 
 
 Configuration: TypeAlias = Snapshot | InMotion

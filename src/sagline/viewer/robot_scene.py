@@ -22,6 +22,8 @@ from sagline.viewer.shapes import Solid
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Colors, TensionScale
 
+NO_SHADOW: Final[dict[str, Any]] = {"cast_shadow": False, "receive_shadow": False}
+
 
 class Nodes:
     """Nodes of a scene by name. A node is created when it is first drawn, and updated afterward."""

@@ -11,7 +11,7 @@ import json
 import logging
 import socket
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from html import escape
 from importlib.resources import files
@@ -29,7 +29,7 @@ from viser.infra import _infra
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.viewer.access import CLIENTS, Access, bracketed
+from sagline.viewer.access import Access, bracketed
 
 STYLES: Final = ("page.css", "state.css", "keys.css", "balance.css", "film.css", "timeline.css")
 SCRIPTS: Final = (  # in the order of execution, before viser's client
@@ -135,19 +135,10 @@ class PageServer(viser.ViserServer):
         return None
 
 
-def start_server(
-    host: str = LOOPBACK,
-    port: int = PORT,
-    title: str = NAME,
-    *,
-    token: bool = True,
-    clients: int = CLIENTS,
-    allow_host: Sequence[str] = (),
-) -> PageServer:
-    """Start a server on an address and a port (0: any free port); options as those of `sagline view`."""
-    # `allow_host`: further names of this computer, or of a proxy before it, in the addresses of browsers
+def start_server(host: str = LOOPBACK, port: int = PORT, title: str = NAME, **limits: Any) -> PageServer:
+    """Start a server on an address and a port (0: any free port); `limits`: arguments of `Access`."""
     _check(host, port)  # viser itself would take the next port or wait forever
-    access = Access(host, token=token, clients=clients, allow_host=allow_host)
+    access = Access(host, **limits)
     with ExitStack() as quiet:
         if not _running:
             quiet.enter_context(_quiet())

@@ -101,7 +101,6 @@ class TensionScale:
         return tuple(tick for tick in found if self.low <= tick <= self.high)
 
 
-_NONE = "–"
 KILO_FROM = 1e5  # smallest force that is written in kilonewtons [N]
 
 
@@ -137,10 +136,7 @@ class ForceUnit(NamedTuple):
 
 def number_text(value: float, form: str) -> str:
     """Text of `value`, or a dash if it is not finite. A number that is rounded to zero does not have a sign."""
-    if not isfinite(value):
-        return _NONE
-    text = f"{value:{form}}"
-    return text if float(text.replace(",", "")) != 0.0 else text.removeprefix("-")
+    return f"{value:z{form}}" if isfinite(value) else "–"
 
 
 def force_unit(robot: Robot) -> ForceUnit:

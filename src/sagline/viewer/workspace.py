@@ -18,7 +18,7 @@ from sagline.kinematics.inverse_rows import Given
 from sagline.robot.robot import Robot, without_cables
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer.readout import color_key, html_block, table_html
-from sagline.viewer.robot_scene import Nodes
+from sagline.viewer.robot_scene import NO_SHADOW, Nodes
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import ForceUnit, cable_color
 from sagline.workspaces.boundary import Outline, outline
@@ -48,7 +48,7 @@ class Patch(NamedTuple):
 def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "double") -> None:
     """Draw `patches` below `name`, instead of the previous patches."""
     for k, patch in enumerate(patches):
-        nodes.mesh(f"{name}/{k}", *patch, side=side, cast_shadow=False, receive_shadow=False)
+        nodes.mesh(f"{name}/{k}", *patch, side=side, **NO_SHADOW)
     nodes.keep_first(name, len(patches))
 
 

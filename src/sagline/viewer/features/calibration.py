@@ -20,7 +20,7 @@ from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import color_key, html_block, refused, sentence, table_html, verdict_box
-from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
+from sagline.viewer.robot_scene import INFEASIBLE, NO_SHADOW, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
 from sagline.viewer.server import chosen_by, toggle, typed
 from sagline.viewer.shapes import ball, error_ellipsoids, placed_balls, readable
 
@@ -253,8 +253,7 @@ class CalibrationFeature(Feature):
             batched_scales=scales.astype(np.float32),
             batched_colors=np.asarray(colors, dtype=np.uint8),
             lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
+            **NO_SHADOW,
             **looks,
         )
 

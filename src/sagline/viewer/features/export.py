@@ -347,12 +347,8 @@ class ExportFeature(Feature):
             send(exporter)
         except (RuntimeError, TimeoutError, SaglineError) as error:
             if client.client_id in self._server.get_clients():
-                client.add_notification("Nothing exported", _why(error), with_close_button=True, auto_close_seconds=8.0)
+                late = "The page sent no picture in time. Keep it visible until the pictures are taken."
+                why = late if isinstance(error, TimeoutError) else str(error)
+                client.add_notification("Nothing exported", why, with_close_button=True, auto_close_seconds=8.0)
         finally:
             exporter.busy.release()
-
-
-def _why(error: Exception) -> str:
-    if isinstance(error, TimeoutError):
-        return "The page sent no picture in time. Keep it visible until the pictures are taken."
-    return str(error)

@@ -27,7 +27,7 @@ from sagline.viewer.feature import Feature, View
 from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
-from sagline.viewer.robot_scene import Nodes
+from sagline.viewer.robot_scene import NO_SHADOW, Nodes
 from sagline.viewer.server import finite_numbers
 from sagline.viewer.shapes import ball, placed_balls, platform_solid, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
@@ -343,8 +343,8 @@ class PushFeature(Feature):
             nodes.hide("/gives_way")
         else:
             (wxyz,), ((x, y, z),) = placed_balls(drawn_for * lengths[None], directions[None])
-            looks: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "position": start}
-            nodes.mesh("/gives_way", *self._ball, COLOR, BALL_OPACITY, wxyz=wxyz, scale=(x, y, z), **looks)
+            looks: dict[str, Any] = {"wxyz": wxyz, "scale": (x, y, z), "position": start, **NO_SHADOW}
+            nodes.mesh("/gives_way", *self._ball, COLOR, BALL_OPACITY, **looks)
         self._text.content, self._release.visible = response_text(response, drawn_for), True
         self.response = response
 

@@ -19,7 +19,7 @@ from sagline.viewer.features.push import PushFeature
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block, refused, sentence
-from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
+from sagline.viewer.robot_scene import INFEASIBLE, NO_SHADOW, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Marks, picture_of
 from sagline.viewer.snapshot import given_yaw
 from sagline.viewer.tension_scale import force_unit
@@ -277,18 +277,9 @@ class RegionFeature(Feature):
         width, height = (region.high - region.low)[list(plane.axes)].tolist()
         middle = 0.5 * (region.low + region.high)
         middle[plane.normal] = plane.at
-        nodes.draw(
-            "/slice/picture",
-            nodes.scene.add_image,
-            image=image,
-            render_width=width,
-            render_height=height,
-            format="png",
-            wxyz=_TURNS[plane.normal],
-            position=middle,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        looks: dict[str, Any] = {"wxyz": _TURNS[plane.normal], "position": middle, "format": "png", **NO_SHADOW}
+        add = nodes.scene.add_image
+        nodes.draw("/slice/picture", add, image=image, render_width=width, render_height=height, **looks)
         nodes.lines("/slice/boundary", boundary, INFEASIBLE, BOUNDARY_WIDTH)
         nodes.lines("/slice/lines", lines, LINE_COLOR, LINE_WIDTH)
         for k, mark in enumerate(marks):
