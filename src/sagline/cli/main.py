@@ -108,9 +108,8 @@ class _Command(TyperCommand):
         """Reject an option in `given` that has no effect, because another option is missing or given."""
         by_label: dict[str, Any] = {_label(parameter): parameter for parameter in self.params}
         for label, parameter in by_label.items():
-            for name, needed in (
-                self.conditions.get(parameter.name, ()) if given.get(parameter.name) is not None else ()
-            ):
+            is_given = given.get(parameter.name) is not None
+            for name, needed in self.conditions.get(parameter.name, ()) if is_given else ():
                 other = by_label[name]
                 if (given.get(other.name, other.default) in (None, False)) == needed:
                     word, allowed = ("without", "both") if needed else ("with", "only one of the two")

@@ -208,10 +208,7 @@ def _marked(name: str, entry: Mapping[str, Any]) -> str:
 
 
 def _deviation_text(_: str, value: Array) -> str:
-    """Standard deviations as text, with one number if all are equal."""
-    if (value == value.flat[0]).all():
-        return f"{value.flat[0]:.4g}"
-    return "\n".join(_numbers(row, 4) for row in np.atleast_2d(value))
+    return _spread(value, digits=4)
 
 
 def _winch_text(field: str, value: Any) -> str:
@@ -223,8 +220,10 @@ def _winch_text(field: str, value: Any) -> str:
 
 
 def _spread(value: Array, digits: int = 5) -> str:
-    """Values of all cables as text, with one number if all are equal."""
-    return f"{value[0]:.{digits}g}" if np.all(value == value[0]) else _numbers(value, digits)
+    """Values as text, with one number if all are equal."""
+    if np.all(value == value.flat[0]):
+        return f"{value.flat[0]:.{digits}g}"
+    return "\n".join(_numbers(row, digits) for row in np.atleast_2d(value))
 
 
 def _text(field: str, value: Any) -> str:

@@ -45,16 +45,15 @@ ABOVE: dict[str, Any] = {
 }  # fmt: skip
 
 
-def name_lines(ax: Axes, title: str = "") -> None:
+def name_lines(ax: Axes) -> None:
     """Name the lines of axes at their ends, or in a legend above the axes."""
     handles, labels = ax.get_legend_handles_labels()
-    ends = _ends(ax, handles)
-    if ends:
-        _write(ax, ends, title)
-        rest = [(handle, label) for handle, label in zip(handles, labels, strict=True) if not _is_line(handle)]
-        handles, labels, title = [handle for handle, _ in rest], [label for _, label in rest], ""
+    if ends := _ends(ax, handles):
+        _write(ax, ends)
+        labels = [label for handle, label in zip(handles, labels, strict=True) if not _is_line(handle)]
+        handles = [handle for handle in handles if not _is_line(handle)]
     if handles:
-        ax.legend(handles, labels, title=title or None, **legend_above(ax, labels, title))
+        ax.legend(handles, labels, **legend_above(ax, labels))
 
 
 def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outside upper center") -> None:
@@ -65,12 +64,10 @@ def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outs
     figure.legend(handles.values(), list(handles), loc=place, ncols=columns, fontsize=look.tick, frameon=False)
 
 
-def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
+def legend_above(ax: Axes, labels: Sequence[str]) -> dict[str, Any]:
     """Arguments for a legend above the axes `ax`, with as many columns as fit."""
-    look = current()
-    width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
-    columns = legend_columns([*labels, title], 0.85 * width, look.tick)
-    return {**ABOVE, "ncols": columns, "fontsize": look.tick, "title_fontsize": look.tick, "borderaxespad": 0.1}
+    size, width = current().tick, cast(Figure, ax.get_figure(root=True)).get_figwidth()
+    return {**ABOVE, "ncols": legend_columns([*labels, ""], 0.85 * width, size), "fontsize": size, "borderaxespad": 0.1}
 
 
 def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
@@ -128,10 +125,10 @@ def _spacing(ax: Axes) -> float:
     return SPACING * current().tick * figure.dpi * POINT / ax.bbox.height
 
 
-def _write(ax: Axes, ends: Sequence[tuple[Line2D, Array, float]], title: str) -> None:
+def _write(ax: Axes, ends: Sequence[tuple[Line2D, Array, float]]) -> None:
     """Write names next to the ends of lines, without overlap. A common prefix is written above all names."""
-    look, names = current(), [str(line.get_label()) for line, _, _ in ends]
-    if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
+    look, title, names = current(), "", [str(line.get_label()) for line, _, _ in ends]
+    if len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
     heights = spread_heights(np.array([height for _, _, height in ends]), _spacing(ax))
     for (line, end, at), name, height in zip(ends, names, heights, strict=True):

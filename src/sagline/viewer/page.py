@@ -120,8 +120,7 @@ class Page:
 
     def serve(self) -> None:
         """React to clients until `stop`; the calling thread does all the work."""
-        self._draw()
-        self._follow()
+        self._update()
         last = time.monotonic()
         while not self._stopping.is_set():
             pace = self._pace
@@ -231,6 +230,10 @@ class Page:
 
     def _forget(self) -> None:
         self.previous = None
+
+    def _update(self) -> None:
+        self._draw()
+        self._follow()
 
     def _draw(self) -> None:
         """Do the tasks of other threads, then solve and draw. Readings and most features follow later."""

@@ -46,9 +46,8 @@ class PlayedPlan(Played):
         """Confirm the poses with exact cables."""
         refuse_moving(plan.anchors, "run")
         if not plan.state.pose.shape:
-            raise InvalidValueError(
-                "run", "a plan of a single pose", "a plan of poses in a row", "Save a plan of a path."
-            )
+            step = "Save a plan of a path."
+            raise InvalidValueError("run", "a plan of a single pose", "a plan of poses in a row", step)
         time = np.arange(len(plan.state.pose), dtype=np.float64) if plan.path is None else plan.path.time
         self.plan, self.robot, self.time = plan, plan.state.one_robot, time - time[0]
         self.confirmation = confirm(plan, progress=progress)
@@ -151,11 +150,9 @@ class PlayedSimulation(Played):
         ]
         heads = ("cable", f"at the winch<br>[{unit.name}]", "length<br>[m]")
         columns = [unit.bare(each) for each in tension], [number_text(each, ".4f") for each in length]
-        verdict = verdict_box("quiet", "Simulated", definitions(rows))
+        table = (verdict_box("quiet", "Simulated", definitions(rows)), heads, columns, NO_CHOICE)
         nodes = None if simulation.nodes is None else np.asarray(simulation.nodes[k])
-        return InMotion(
-            self.robot, pose, k, tension, length, verdict, heads, columns, NO_CHOICE, nodes=nodes, broken=broken
-        )
+        return InMotion(self.robot, pose, k, tension, length, *table, nodes=nodes, broken=broken)
 
     def code(self, source: str, time: float) -> list[str]:
         """Lines of Python that reproduce a sample; `source` is an expression of the simulation."""
@@ -176,12 +173,9 @@ class PlayedSimulation(Played):
         """Charts of the tensions at the frame ends and the displacement, and the events."""
         simulation, unit = self.simulation, force_unit(self.robot)
         tension, position = tension_chart("Tension at the winch", self.robot, self.tension), simulation.pose.position
-        away = Chart(
-            "Motion along x, y, z", "mm", 1, ("x", "y", "z"), lambda rows: 1e3 * (position[rows] - position[0])
-        )
-        began = float(simulation.time[0])
-        marks = tuple(
-            (event.time - began, _event_text(event, unit), event.kind in FAILURES) for event in simulation.events
-        )
+        axes, began = ("x", "y", "z"), float(simulation.time[0])
+        away = Chart("Motion along x, y, z", "mm", 1, axes, lambda rows: 1e3 * (position[rows] - position[0]))
+        events = simulation.events
+        marks = tuple((each.time - began, _event_text(each, unit), each.kind in FAILURES) for each in events)
         spans = limit_violations(self.robot, self.time, self.tension)
         return Track(self.time, (tension, away), spans, marks, (("actual", ACTUAL),))

@@ -159,17 +159,15 @@ def _summary(state: Equilibrium, error: Array | None) -> str:
     unit = force_unit(state.one_robot)
     rows = [("Tensions", unit.span(state.chord_tension)), ("Nearest limit", _nearest_limit(state, unit))]
     if is_underconstrained(state.one_robot):
-        rows.append(
-            ("Rotation", f"from the balance of {state.one_robot.cable_count} cables; only the position is given")
-        )
+        text = f"from the balance of {state.one_robot.cable_count} cables; only the position is given"
+        rows.append(("Rotation", text))
     else:
         extra = unit.written(float(capacity_margin(state)))
         rows.append(("Spare force", f"{extra} more in any direction, no moment; redistributed tensions"))
     if error is not None:
         away = float(np.linalg.norm(error))
-        rows.append(
-            ("Equilibrium", f"{n(away, unit='m')} from the planned pose" if away > EXACT else "at the planned pose")
-        )
+        text = f"{n(away, unit='m')} from the planned pose" if away > EXACT else "at the planned pose"
+        rows.append(("Equilibrium", text))
     return definitions(rows)
 
 

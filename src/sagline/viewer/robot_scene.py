@@ -53,11 +53,8 @@ class Nodes:
         if not len(segments):
             return self.hide(name)
         units, thickness = ("screen", width) if self._pixel == 0.0 else ("world", width * self._pixel)
-        looks: dict[str, Any] = {
-            "colors": np.asarray(color, dtype=np.uint8),
-            "thickness": thickness,
-            "thickness_units": units,
-        }
+        shade = np.asarray(color, dtype=np.uint8)
+        looks: dict[str, Any] = {"colors": shade, "thickness": thickness, "thickness_units": units}
         return self.draw(name, self.scene.add_line_segments, points=segments.astype(np.float32), **looks)
 
     def arrows(self, name: str, ends: Array, color: Any, shaft: float, head: float, length: float) -> None:
@@ -79,10 +76,8 @@ class Nodes:
 
     def mesh(self, name: str, vertices: Array, faces: Indices, color: Any, opacity: Any = None, **looks: Any) -> Any:
         """Draw a mesh in one color."""
-        points, corners = vertices.astype(np.float32), faces.astype(np.uint32)
-        return self.draw(
-            name, self.scene.add_mesh_simple, vertices=points, faces=corners, color=color, opacity=opacity, **looks
-        )
+        looks |= {"vertices": vertices.astype(np.float32), "faces": faces.astype(np.uint32)}
+        return self.draw(name, self.scene.add_mesh_simple, color=color, opacity=opacity, **looks)
 
     def hide(self, *names: str) -> None:
         """Hide nodes, if they exist."""
@@ -166,9 +161,8 @@ class RobotScene:
         """Reject invalid positions and positions far outside the robot."""
         far = FAR * self._size
         if not np.all(np.abs(position - 0.5 * (self._low + self._high)) < far):
-            raise InvalidValueError(
-                "platform", "dragged out of sight", f"within {far:.3g} m of the robot", "Drag it back, or reset it."
-            )
+            allowed = f"within {far:.3g} m of the robot"
+            raise InvalidValueError("platform", "dragged out of sight", allowed, "Drag it back, or reset it.")
 
     def place(self, pose: Pose) -> None:
         """Move the platform and its gizmo to a pose."""

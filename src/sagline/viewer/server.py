@@ -188,9 +188,8 @@ def _check(host: str, port: int) -> None:
     if not 0 <= port <= 65535:
         raise InvalidValueError("port", port, "0 to 65535", "Choose another with --port.")
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, kind, protocol, _, address = found[0]
         with socket.socket(family, kind, protocol) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
@@ -198,13 +197,10 @@ def _check(host: str, port: int) -> None:
         if getattr(error, "errno", None) == errno.EADDRINUSE:
             step = "Choose another with --port; --port 0 takes any that is free."
             raise InvalidValueError(f"port {port}", f"in use on {host}", "a free port", step) from None
-        reason = getattr(error, "strerror", None) or error
-        raise InvalidValueError(
-            f"{host}:{port}",
-            f"nothing to listen on ({reason})",
-            "an address of this machine and a free port",
-            "Choose others with --host and --port; --port 0 takes any that is free.",
-        ) from None
+        value = f"nothing to listen on ({getattr(error, 'strerror', None) or error})"
+        allowed = "an address of this machine and a free port"
+        step = "Choose others with --host and --port; --port 0 takes any that is free."
+        raise InvalidValueError(f"{host}:{port}", value, allowed, step) from None
 
 
 def chosen_by(topic: str, value: str | int) -> str:

@@ -67,12 +67,8 @@ def depends_on_history(method: TensionMethod) -> bool:
 # the exact model first
 MODELS: Final = MappingProxyType({model_name(make()): make() for make in reversed(models_by_name().values())})
 # methods that depend on history are last, so that the default depends only on the pose
-METHODS: Final = MappingProxyType(
-    {
-        method_name(method): method
-        for method in sorted((make() for make in methods_by_name().values()), key=depends_on_history)
-    }
-)
+_sorted = sorted((make() for make in methods_by_name().values()), key=depends_on_history)
+METHODS: Final = MappingProxyType({method_name(method): method for method in _sorted})
 
 
 @dataclass(frozen=True, slots=True)

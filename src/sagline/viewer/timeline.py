@@ -192,10 +192,8 @@ def _most_important(track: Track) -> list[TimelineMark]:
     """Marks of a track. If there are too many marks, the faults and the last of the other marks."""
     if len(track.marks) <= MOST_MARKS:
         return sorted(track.marks)
-    bad, rest = (
-        [(time, text, is_bad) for time, text, is_bad in track.marks if is_bad is kind] for kind in (True, False)
-    )
-    bad = bad[-MOST_MARKS:]
+    bad = [mark for mark in track.marks if mark[2]][-MOST_MARKS:]
+    rest = [mark for mark in track.marks if not mark[2]]
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :])
 
 

@@ -56,9 +56,8 @@ def bands(found: Calibration) -> Indices:
 def verdict_text(found: Calibration) -> str:
     """HTML of the status."""
     kind = "good" if found.status is CalibrationStatus.FOUND else "bad"
-    head = {CalibrationStatus.FOUND: "Calibrated", CalibrationStatus.DOUBTFUL: "Doubtful"}.get(
-        found.status, "Not converged"
-    )
+    heads = {CalibrationStatus.FOUND: "Calibrated", CalibrationStatus.DOUBTFUL: "Doubtful"}
+    head = heads.get(found.status, "Not converged")
     text = "" if kind == "good" else f"{escape(found.status.text)}<br>"
     of = f"{len(found.values)} numbers from {counted(len(found.rows), 'pose')}"
     out = (f"<br>{counted(len(rows), 'row')} left out: {escape(why.text)}" for why, rows in found.left_out.items())
@@ -178,12 +177,12 @@ class CalibrationFeature(Feature):
             self._outliers_html = gui.add_html("")
             self._pose_html = gui.add_html("")
             gui.add_html(parameters_text(found))
-        page.refresh_on(self._wanted, self._relative, self._factor, self._poses_wanted, self._field)
+        self._controls = self._wanted, self._relative, self._factor, self._poses_wanted, self._field
+        page.refresh_on(*self._controls)
 
     def depends(self, view: View) -> Hashable:
         """Key of the controls, without the view."""
-        controls = self._wanted, self._relative, self._factor, self._poses_wanted, self._field
-        return tuple(each.value for each in controls)
+        return tuple(each.value for each in self._controls)
 
     def follow(self, view: View) -> None:
         """Update drawing and text for the values of the controls."""

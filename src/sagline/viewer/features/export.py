@@ -248,13 +248,10 @@ class ExportFeature(Feature):
         with gui.add_folder("Export", expand_by_default=False):
             self._paper = gui.add_dropdown("Picture for", tuple(PAPERS))
             self._strip = gui.add_checkbox("With legend", True, hint="The robot's name and the colors of tensions.")
-            buttons = [
-                (gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA), self._send_picture),
-                (gui.add_button("Scene (GLB)", icon=viser.Icon.BOX), self._send_scene),
-            ]
+            picture = gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA)
+            scene = gui.add_button("Scene (GLB)", icon=viser.Icon.BOX)
             self._film: Any = gui.add_button("Film", icon=viser.Icon.MOVIE, visible=False)
-            buttons.append((self._film, self._send_film))
-        for button, send in buttons:
+        for button, send in ((picture, self._send_picture), (scene, self._send_scene), (self._film, self._send_film)):
             button.on_click(partial(self._export, send))
         channel.on(TOPIC, self._cancel)
         server.on_client_disconnect(self._remove)

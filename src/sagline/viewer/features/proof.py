@@ -104,9 +104,7 @@ def _projection(axes: str, points: Array, forces: tuple[_PlatformForce, ...], sc
     low, high = points.min(axis=0), points.max(axis=0)
     height = scale * float(high[1] - low[1]) + 2.0 * BORDER
     left = 0.5 * (WIDTH - scale * float(high[0] - low[0]))
-    places = np.column_stack(
-        (left + scale * (points[:, 0] - low[0]), height - BORDER - scale * (points[:, 1] - low[1]))
-    )
+    places = np.array([left, height - BORDER]) + scale * (points - low) * [1.0, -1.0]
     labels: list[Label] = []
     arrows = "".join(_arrow(force, places[k], places[k + 1], labels) for k, force in enumerate(forces))
     right, up = axes[0], axes[1]

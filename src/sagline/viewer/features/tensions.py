@@ -44,10 +44,7 @@ class DotField:
     def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
         """Make the drawing of a nonempty polygon, for one or two redundant cables."""
         corners, sides = polygon.vertices, polygon.sides
-        if before is not None:
-            low, high = before.low, before.high
-        else:
-            low, high = _extent(polygon, dot)
+        low, high = _extent(polygon, dot) if before is None else (before.low, before.high)
         if not polygon.bounded:
             corners, sides = _clipped(corners, sides, low, high)
         return cls(polygon, locked(np.ascontiguousarray(corners)), sides, low, high)
@@ -103,9 +100,8 @@ def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
     known = np.array([side is not None for side in polygon.sides])
     if polygon.vertices.shape[1] == 2:
         known &= np.roll(known, 1)  # a corner of two limits, not of the box
-    points = np.vstack(
-        (polygon.vertices[known], dot[None] if np.isfinite(dot).all() else polygon.vertices[:0], np.zeros_like(dot))
-    )
+    dots = [dot] * bool(np.isfinite(dot).all())
+    points = np.vstack((polygon.vertices[known], *dots, np.zeros_like(dot)))
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.max(high - low)) or float(np.abs(polygon.origin).max()) or 1.0
     return low - BEYOND * size, high + BEYOND * size
@@ -157,11 +153,9 @@ def polygon_figure(
     drawn = dot_field_of(snapshot) if field is None else field
     if drawn is None:
         return sentence("No tensions within the limits balance the platform.")
-    return (
-        html_block(_drawing(snapshot, drawn, marks, movable=field is not None))
-        + sentence(_description(snapshot, drawn, movable=field is not None))
-        + _key(snapshot, marks, back)
-    )
+    movable = field is not None
+    figure = html_block(_drawing(snapshot, drawn, marks, movable=movable))
+    return figure + sentence(_description(snapshot, drawn, movable=movable)) + _key(snapshot, marks, back)
 
 
 def _why_not_drawn(snapshot: Snapshot) -> str:
