@@ -109,13 +109,11 @@ def _feasible(
         status, lengths, tensions = (np.stack(parts, axis=1) for parts in zip(*every, strict=True))
         statuses.append(status.ravel())
         usable = (status == PoseStatus.SOLVED) & _in_range(robot, lengths, tensions)
-        which, number = np.nonzero(usable & _different(tensions))
-        place = part.start + which
-        found.append(
-            CandidatePoses(
-                pose_rows(group)[which], lengths[which, number], tensions[which, number], place, place % 2 == 0
-            )
-        )
+        apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
+        same = np.tril(apart <= SAME * np.nanmax(tensions, initial=0.0), -1).any(axis=-1)  # as a previous set
+        which, number = np.nonzero(usable & ~same)
+        place, own = part.start + which, (lengths[which, number], tensions[which, number])
+        found.append(CandidatePoses(pose_rows(group)[which], *own, place, place % 2 == 0))
     return _concatenated(found), np.concatenate(statuses)
 
 
@@ -127,13 +125,6 @@ def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) 
         missing = np.full((len(poses), robot.cable_count), np.nan)
         return np.full(len(poses), PoseStatus.NO_CHORD, dtype=np.int8), missing, missing
     return plan.status, plan.unstrained_length, plan.state.cables.frame_end_tension
-
-
-def _different(tensions: Array) -> Flags:
-    """True (N, sets) for each set of `tensions` (N, sets, m) that is not equal to a previous set at the same pose."""
-    apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
-    same = apart <= SAME * np.nanmax(tensions, initial=0.0)
-    return np.asarray(~np.tril(same, -1).any(axis=-1))
 
 
 def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
@@ -155,9 +146,8 @@ def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
     beyond = "the winches do not have enough cable, or the tensions are outside the range of the load cells"
     why = beyond if reason is PoseStatus.SOLVED else reason.text.split(";")[0]
     value = f"without a pose that {robot.name} can hold among {len(statuses):,} tried ({why})"
-    return InvalidValueError(
-        "box", value, "a box with feasible poses", "Give box=PoseBox(low, high, tilt) with other poses."
-    )
+    step = "Give box=PoseBox(low, high, tilt) with other poses."
+    return InvalidValueError("box", value, "a box with feasible poses", step)
 
 
 PASSES: Final = 50  # passes over all pairs of edges; a tour of a hundred places takes fewer than ten

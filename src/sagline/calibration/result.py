@@ -204,12 +204,9 @@ class Calibration(Findings, Saved):
         Raises:
             InvalidValueError: In the cases in which the function `forward` raises this error.
         """
-        believed = numbers(unstrained_length, "unstrained_length", "m")
-        lengths = (
-            believed
-            if believed.shape[-1:] != self.length_offset.shape
-            else self.length_scale * believed + self.length_offset
-        )
+        lengths = numbers(unstrained_length, "unstrained_length", "m")
+        if lengths.shape[-1:] == self.length_offset.shape:
+            lengths = self.length_scale * lengths + self.length_offset
         found = forward(self.robot, lengths, start, self.model)
         rows, shape = np.atleast_2d(found.state.unstrained_length), found.pose.shape
         there = np.isfinite(rows).all(axis=1) & np.atleast_1d(found.stable)

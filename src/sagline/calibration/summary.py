@@ -158,12 +158,10 @@ def _criticisms(found: Findings, width: int) -> Iterator[str]:
     yield "Contradicted by the readings, although not estimated:"
     for one in found.criticisms:
         unit = found.parameters.units[found.parameters.labels.index(one.moves)]
-        change = (
-            f"{one.moves} would change by {n(one.change, '+.2g', unit)}, {n(one.deviations, '.2g')} standard errors"
-        )
+        by = f"{n(one.change, '+.2g', unit)}, {n(one.deviations, '.2g')} standard errors"
         fall = f"chi squared would fall by {n(one.fall, ',.0f')} (probability by chance {n(one.chance, '.1g')})"
-        text = f"- {one.name}: {fall}, and {change}; add {one.kind} to the unknowns, or correct it"
-        yield from _wrapped(text, width, "  ", "    ")
+        text = f"- {one.name}: {fall}, and {one.moves} would change by {by}"
+        yield from _wrapped(f"{text}; add {one.kind} to the unknowns, or correct it", width, "  ", "    ")
 
 
 def _departures(found: Findings, width: int) -> Iterator[str]:

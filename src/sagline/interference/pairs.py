@@ -189,7 +189,6 @@ def _names(obstacles: tuple[Obstacle, ...]) -> list[str]:
     return names
 
 
-Form = Box | Capsule | Sphere | Mesh
 MISSING: Final = 'Meshes need python-fcl, which is not installed. Run: pip install "sagline[workspace]"'
 ROUNDING: Final = 1e-12  # rounding error, relative to the coordinates, that is subtracted from a lower bound
 _PIECES: Final = 4000  # largest number of examined cable pieces per distance
@@ -216,7 +215,7 @@ _Nearest = tuple[float, float, Array, Array]
 class Meshed:
     """Pairs of bodies with at least one mesh. The bodies are prepared only once."""
 
-    def __init__(self, pairs: Pairs, forms: tuple[Form | None, ...], precision: float) -> None:
+    def __init__(self, pairs: Pairs, forms: tuple[Obstacle | None, ...], precision: float) -> None:
         """Prepare the bodies `forms`: the platform, or None, then the obstacles in the order of their indices."""
         self._fcl = package()
         self._pairs, self._precision, self._parts = pairs, precision, len(pairs.parts)
@@ -242,7 +241,7 @@ class Meshed:
                 if least is not None:
                     enough = min(enough, found[0])
 
-    def _solid(self, form: Form | None) -> _Solid:
+    def _solid(self, form: Obstacle | None) -> _Solid:
         still = np.eye(3), np.zeros(3)
         if isinstance(form, Box):
             form = Mesh(_SIGNS * form.size @ form.orientation.T + form.center, _FACES, form.name)

@@ -185,10 +185,8 @@ def _fit_measurements(
         raise InvalidValueError("model", "Straight()", "a cable model other than Straight", step)
     lengths = found.results[tables.LENGTH]
     readings = _fitting("frame_end_tension", measured.frame_end_tension, lengths.shape)
-    deviations = (
-        _fitting("tension_deviation", measured.tension_deviation, lengths.shape[1:]),
-        _fitting("length_deviation", measured.length_deviation, lengths.shape[1:]),
-    )
+    names = "tension_deviation", "length_deviation"
+    deviations = [_fitting(name, getattr(measured, name), lengths.shape[1:]) for name in names]
     covariance = np.full((len(lengths), 6, 6), np.nan)
     for i in np.flatnonzero(found.stable):
         sample = np.array([i])

@@ -106,21 +106,14 @@ class ForwardRows(NamedTuple):
 
     def keep(self, samples: Indices | slice, other: ForwardRows, which: Indices | slice = slice(None)) -> None:
         """Replace the results of the samples with the indices `which` (k,) by the results in `other`, (k,)."""
-        self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
-        self.cable_status[samples] = other.cable_status[which]
-        self.numbers[samples] = other.numbers[which]
-        self.pose_status[samples] = other.pose_status[which]
+        for own, new in ((self[k], other[k]) for k in (0, 2, 3, 4)):  # all fields but the results
+            own[samples] = new[which]
 
     def part(self, samples: Indices) -> ForwardRows:
         """Copies of the results of some samples (k,)."""
-        return ForwardRows(
-            self.poses[samples],
-            self.results[:, samples],
-            self.cable_status[samples],
-            self.numbers[samples],
-            self.pose_status[samples],
-        )
+        cables, numbers, status = self.cable_status[samples], self.numbers[samples], self.pose_status[samples]
+        return ForwardRows(self.poses[samples], self.results[:, samples], cables, numbers, status)
 
     def last_pose(self, before: Array) -> Array:
         """Last pose row with a result, (1, POSE_COLUMNS), or `before` if no sample has a result."""

@@ -246,9 +246,8 @@ class _Ledger:
         if not np.array_equal(known[:, : self._width], values[: len(known)]):
             wrong = int(np.argmax((known[:, : self._width] != values[: len(known)]).any(axis=1)))
             allowed = "the robot of this search; packages or machine may have changed since the search began"
-            raise InvalidValueError(
-                f"row {first + wrong + 1} of the folder", "another robot", allowed, "Give another folder."
-            )
+            row = f"row {first + wrong + 1} of the folder"
+            raise InvalidValueError(row, "another robot", allowed, "Give another folder.")
         return known
 
     def _check_first(self) -> None:

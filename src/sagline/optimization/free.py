@@ -177,10 +177,8 @@ class FreeCable(Free):
                 return (part,), partial(_write_cables, self.catalogue)
         density, stiffness = own.linear_density[0], own.axial_stiffness[0]
         value = f"{1e3 * density:g} g/m, {stiffness:g} N, up to {robot.tension_max[0]:g} N"
-        step = "Add the robot's own cable, because the search begins with it."
-        raise InvalidValueError(
-            f"{item}: the robot's cable 0", value, "equal for all cables, and in the catalogue", step
-        )
+        name, step = f"{item}: the robot's cable 0", "Add the robot's own cable, because the search begins with it."
+        raise InvalidValueError(name, value, "equal for all cables, and in the catalogue", step)
 
 
 def _write_cables(catalogue: tuple[CableChoice, ...], cables: Array, values: Array) -> None:

@@ -71,10 +71,8 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
         room = float(np.abs(away[side != 0.0]).min(initial=np.inf))
         if inward >= room:
             name = "xyz"[axis]
-            value, allowed = (
-                f"up to {inward:g} m inward",
-                f"< {room:g} m, the distance to the plane {name} = {plane:g} m",
-            )
+            value = f"up to {inward:g} m inward"
+            allowed = f"< {room:g} m, the distance to the plane {name} = {plane:g} m"
             step = f"Reduce the bounds along {name}, because anchors would pass their mirror images."
             raise InvalidValueError(f"{item}: the shift along {name}", value, allowed, step)
     return shifts
@@ -199,9 +197,8 @@ def _shifts(value: ArrayLike, item: str, count: int) -> Array:
     given = checked(value, item, "m")
     if given.shape not in ((), (count,)):
         allowed = f"a number, or {count} of them, one per direction"
-        raise InvalidValueError(
-            item, f"of shape {given.shape}", allowed, "Give three numbers for x, y, z, or use along."
-        )
+        step = "Give three numbers for x, y, z, or use along."
+        raise InvalidValueError(item, f"of shape {given.shape}", allowed, step)
     return np.array(np.broadcast_to(given, (count,)))
 
 

@@ -242,9 +242,8 @@ class Request:
                 raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Give only anchors that move.")
         if self.inner and not any(goal.needs == "margin" for goal in self.goals):
             step = "Add Goal('mean_margin'), because anchors move to the largest margin."
-            raise InvalidValueError(
-                "inner", "given without a goal about margins", "given with a goal about margins", step
-            )
+            value, allowed = (f"given {word} a goal about margins" for word in ("without", "with"))
+            raise InvalidValueError("inner", value, allowed, step)
         for goal in self.goals if self.optimizer == "nsga2" else ():
             if goal.weight != 1.0:
                 step = 'Omit the weight, or choose the optimizer "cma".'

@@ -129,7 +129,6 @@ def _loads_of(wrenches: WrenchSet) -> Array:
         raise InvalidValueError(item, counted(count, "corner"), allowed, step)
     parts = np.split(wrenches.corners, np.cumsum(wrenches.sizes)[:-1]) if len(wrenches.sizes) else []
     parts += [np.stack((one, -one)) for one in segments]
-    corners = wrenches.center + np.array(
-        [np.sum(one, axis=0) for one in product(*parts)] if parts else np.zeros((1, 6))
-    )
+    sums = [np.sum(one, axis=0) for one in product(*parts)] if parts else np.zeros((1, 6))
+    corners = wrenches.center + np.array(sums)
     return np.unique(np.vstack((corners.mean(axis=0), corners)), axis=0)

@@ -93,9 +93,8 @@ def boundary(
     open_faces = tuple(name for name, flat in zip(FACES, on_box, strict=True) if flat.any())
     curved = np.flatnonzero(~np.logical_or.reduce(on_box))
     faces = net.faces[curved]
-    between, errors = _bulge_volumes(
-        counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid
-    )
+    slopes = _slopes(surface.vertices, faces, net, slope)
+    between, errors = _bulge_volumes(counted, surface.vertices, faces, slopes, grid)
     volumes = volumes_of(surface.vertices, surface.faces)
     volumes[curved] += between
     volume, error = float(volumes.sum()), float(errors.sum())

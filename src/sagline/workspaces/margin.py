@@ -70,22 +70,13 @@ class MarginRows:
         check_cable_count(shared)
         self.cable_count = m = shared.cable_count
         if table.shape[1:] != (m, tables.CABLE_COLUMNS) or not len(table) or len(bodies) not in (1, len(table)):
-            wanted = f"shape (R, {m}, {tables.CABLE_COLUMNS})"
-            raise InvalidValueError(
-                "cables", f"of shape {table.shape}", wanted, "Make the tables with cable_table(robot)."
-            )
+            wanted, step = f"shape (R, {m}, {tables.CABLE_COLUMNS})", "Make the tables with cable_table(robot)."
+            raise InvalidValueError("cables", f"of shape {table.shape}", wanted, step)
         self.robot_count = len(table)
-        limits = (LIMITS_OF[shared.tension_limits_of], np.nan)
+        limits, terms = (LIMITS_OF[shared.tension_limits_of], np.nan), (freedom, bodies, table)
         (inertias,) = robot_fields(robots, "inertia")
-        terms = (freedom, bodies, table)
-        arms = _arms(table, bodies, moment_arm)
-        self._given = (
-            (model.code, *model.parameters),
-            limits,
-            terms,
-            _set_terms(wrenches, _locked(inertias.reshape(-1, 3, 3))),
-            arms,
-        )
+        loads = _set_terms(wrenches, _locked(inertias.reshape(-1, 3, 3)))
+        self._given = (model.code, *model.parameters), limits, terms, loads, _arms(table, bodies, moment_arm)
 
     def about(self, wrench: Array) -> MarginRows:
         """`MarginRows` for the wrench set shifted by `wrench` [N, N m], (6,), which is not checked."""

@@ -60,7 +60,8 @@ class MotionSet(Result):
         Negative if the set does not contain rest, for example if a motor is too weak to hold the platform.
         """
         free = self.state.one_robot.freedom
-        along = self.normals @ free[:, :3] @ _translations(free)
+        translations = free[np.linalg.norm(free[:, 3:], axis=1) < 0.5, :3]
+        along = self.normals @ free[:, :3] @ translations.T
         size = np.linalg.norm(along, axis=1)
         return float((self.offsets[size > 0.0] / size[size > 0.0]).min())
 
@@ -116,11 +117,6 @@ class MotionSet(Result):
             step = "Give a direction of a free motion."
             raise InvalidValueError("direction", "a forbidden motion", f"motions of the pattern {pattern}", step)
         return np.asarray(along)
-
-
-def _translations(freedom: Array) -> Array:
-    """Orthonormal basis (3, k) of the free translations."""
-    return np.asarray(freedom[np.linalg.norm(freedom[:, 3:], axis=1) < 0.5, :3].T)
 
 
 @of_equilibrium
@@ -279,10 +275,5 @@ def _motion_set(state: Equilibrium, corners: Array) -> MotionSet:
         raise _thin_set() from None
     equations = np.unique(hull.equations.round(12), axis=0)
     free = state.one_robot.freedom
-    return MotionSet(
-        state,
-        locked(hull.points[hull.vertices] @ free),
-        locked(np.ascontiguousarray(equations[:, :-1])),
-        locked(np.ascontiguousarray(-equations[:, -1])),
-        float(hull.volume),
-    )
+    normals, offsets = (locked(np.ascontiguousarray(part)) for part in (equations[:, :-1], -equations[:, -1]))
+    return MotionSet(state, locked(hull.points[hull.vertices] @ free), normals, offsets, float(hull.volume))

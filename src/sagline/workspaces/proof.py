@@ -38,10 +38,8 @@ BLOCK: Final = 1 << 11  # boxes per block; a block takes about 0.03 s, and inter
 MOST_CELLS: Final = 4_000_000  # largest number of cells that wait for a proof; they take 100 MB
 OBLONG: Final = 0.6  # an edge is halved if it is longer than this share of the longest edge
 PARTS: Final = (1, 4, 8, 16)  # possible numbers of parts of an edge
-PRECISION: Final = (
-    1.0,
-    1e-12,
-)  # weight of the nonlinear terms, and relative rounding error of a sum of a thousand terms
+# weight of the nonlinear terms, and relative rounding error of a sum of a thousand terms
+PRECISION: Final = (1.0, 1e-12)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -79,9 +77,8 @@ class Prover:
     ) -> None:
         """Prepare the proofs for a robot without pulleys. `precision` exists only for tests."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
-        self._given = (
-            (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
-        )  # fmt: skip
+        loads = _load_terms(wrenches, robot)
+        self._given = (model.code, *model.parameters), limits, robot_terms(robot), loads, precision
         self.size = 0.5 * float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
         self.axes = np.eye(3) if robot.plane_normal is None else robot.plane_normal[None]
         self.deadline, self.tried, self._progress = np.inf, 0, progress

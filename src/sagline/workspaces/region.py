@@ -187,14 +187,10 @@ def _check_turns(robot: Robot, given: Orientations) -> None:
     wrong = np.flatnonzero(np.linalg.norm(turns, axis=1) > ROUNDING)
     if wrong.size:
         k = int(wrong[0])
-        allowed = "a turn about plane_normal" if robot.motion_pattern in ROTATING else "no turn"
-        value, step = (
-            f"a turn by {turn_in_words(turns[k])}",
-            "Leave out this rotation, or give the robot another motion_pattern.",
-        )
-        raise InvalidValueError(
-            f"orientations[{k}]", value, f"{allowed}, by motion_pattern {robot.motion_pattern}", step
-        )
+        value, turn = f"a turn by {turn_in_words(turns[k])}", "a turn about plane_normal"
+        allowed = f"{turn if robot.motion_pattern in ROTATING else 'no turn'}, by motion_pattern {robot.motion_pattern}"
+        step = "Leave out this rotation, or give the robot another motion_pattern."
+        raise InvalidValueError(f"orientations[{k}]", value, allowed, step)
 
 
 AXES: Final = "xyz"

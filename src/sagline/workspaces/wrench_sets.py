@@ -69,14 +69,9 @@ class WrenchSet(ByFields):
         """Minkowski sum with another set."""
         if not isinstance(other, WrenchSet):
             return NotImplemented
-        return WrenchSet(
-            locked(self.center + other.center),
-            locked(np.concatenate([self.segments, other.segments])),
-            locked(np.concatenate([self.ellipsoids, other.ellipsoids])),
-            locked(np.concatenate([self.corners, other.corners])),
-            locked(np.concatenate([self.sizes, other.sizes])),
-            locked(self.accelerations + other.accelerations),
-        )
+        center, accelerations = self.center + other.center, self.accelerations + other.accelerations
+        pairs = ((getattr(self, name), getattr(other, name)) for name in ("segments", "ellipsoids", "corners", "sizes"))
+        return WrenchSet(*map(locked, (center, *map(np.concatenate, pairs), accelerations)))
 
     def __str__(self) -> str:
         """Description of the set in one line, for example "±100 N, ±20 N m"."""

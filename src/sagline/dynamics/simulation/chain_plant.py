@@ -104,10 +104,8 @@ class ChainPlant(Plant):
             raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
         light = np.flatnonzero(~(given.robot.cables.linear_density > 0.0))
         if light.size:
-            step = 'Give a density, or cable_mass="none".'
-            raise InvalidValueError(
-                f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m for a cable with mass", step
-            )
+            item, step = f"cable {light[0]}: linear_density", 'Give a density, or cable_mass="none".'
+            raise InvalidValueError(item, "0 kg/m", "> 0 kg/m for a cable with mass", step)
 
     @staticmethod
     def wave_frequency(given: InitialConditions, nodes: int) -> float:
@@ -129,13 +127,8 @@ class ChainPlant(Plant):
         capacity = int(np.ceil(np.maximum(longest, nodes)).max()) + SPARE
         place = np.zeros((m, 3, capacity))
         place[:, :, : nodes + 1] = at_rest
-        self._chains = [
-            table,
-            place,
-            np.zeros_like(place),
-            np.zeros((m, 4 * capacity)),
-            np.full(m, nodes - 1, dtype=np.int64),
-        ]
+        work, counts = np.zeros((m, 4 * capacity)), np.full(m, nodes - 1, dtype=np.int64)
+        self._chains = [table, place, np.zeros_like(place), work, counts]
         self._stock = np.full(2, np.nan)
         self._travel = nodes * table[:, c.ELEMENT] * np.sqrt(table[:, c.DENSITY] / table[:, c.STIFFNESS])
         self._ends = (robot.platform_anchors - robot.center_of_mass) @ self.axes

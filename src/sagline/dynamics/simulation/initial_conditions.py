@@ -71,19 +71,15 @@ class TimeTable:
             allowed, step = f"shape ({time.size}, {columns})", "Give one row per time, or a single row."
             raise InvalidValueError(item, f"of shape {rows.shape}", allowed, step)
         if time[0] > begin:
-            allowed = f"a time <= {begin:g} s, the start"
-            raise InvalidValueError(
-                f"{item}: time[0]", f"{time[0]:g} s", allowed, "Start the table at the start of the simulation."
-            )
+            allowed, step = f"a time <= {begin:g} s, the start", "Start the table at the start of the simulation."
+            raise InvalidValueError(f"{item}: time[0]", f"{time[0]:g} s", allowed, step)
         return cls.linear(time, rows) if time.size > 1 else cls.constant(rows[0])
 
     @property
     def arrays(self) -> CubicTableArrays:
         """Read-only, C-contiguous arrays for kernels."""
-        time, value, begin, end = (
-            locked(np.ascontiguousarray(array, dtype=np.float64).view())
-            for array in (self.time, self.value, self.begin, self.end)
-        )
+        given = self.time, self.value, self.begin, self.end
+        time, value, begin, end = (locked(np.ascontiguousarray(part, dtype=np.float64).view()) for part in given)
         return time, value, begin, end
 
     def check_lengths(self, robot: Robot) -> None:
@@ -128,15 +124,11 @@ class TimeTable:
             return self
         k = int(np.searchsorted(self.time, time))
         value, rate = self.at(time)
-        before = rate if 0 < k < len(self.time) else np.zeros_like(rate)
-        outside = k in (0, len(self.time))
         times, values = np.insert(self.time, k, time), np.insert(self.value, k, value, axis=0)
-        if outside:
-            place = 0 if k == 0 else len(self.begin)
-            return TimeTable(
-                times, values, np.insert(self.begin, place, before, axis=0), np.insert(self.end, place, before, axis=0)
-            )
-        begin, end = np.insert(self.begin, k, rate, axis=0), np.insert(self.end, k - 1, rate, axis=0)
+        inside = 0 < k < len(self.time)
+        rate = rate if inside else np.zeros_like(rate)
+        first, second = (k, k - 1) if inside else (min(k, len(self.begin)),) * 2
+        begin, end = np.insert(self.begin, first, rate, axis=0), np.insert(self.end, second, rate, axis=0)
         return TimeTable(times, values, begin, end)
 
     def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:
@@ -214,9 +206,8 @@ def initial_conditions(
     if duration is not None:
         end = initial.begin + number(duration, "duration", "s", above=0.0)
     elif not end > initial.begin:
-        raise InvalidValueError(
-            "duration", "not given", "> 0 s for a robot at rest", "Give for instance duration=10.0."
-        )
+        step = "Give for instance duration=10.0."
+        raise InvalidValueError("duration", "not given", "> 0 s for a robot at rest", step)
     table = initial.wrench
     if wrench is not None:
         table = TimeTable.of(wrench, "wrench", "N or N m", 6, initial.begin)

@@ -115,11 +115,7 @@ class Encoders:
         self.counts = np.empty(m)  # whole counts, as floats
         offset = drums.winches.count_zero + zero * rate
         given = ((drums.table, drums.starts), wound, locked(stretch), locked(offset), locked(rate * 1.0))
-        self._read = bound(read_encoders, *given, np.empty((3, 1, m)), self.counts)
-
-    def read(self) -> None:
-        """Fill the array of the counts."""
-        self._read()
+        self.read = bound(read_encoders, *given, np.empty((3, 1, m)), self.counts)  # fills the array of the counts
 
 
 class LoadCells:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
+from math import comb
 from operator import mul
 from typing import Final
 
@@ -138,7 +139,7 @@ def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa:
         >>> print(shaper.time, shaper.amplitude, shaper.residual(2.2).round(3))
         [0.   0.25] [0.5 0.5] 0.156
     """
-    return _several(frequency, damping_ratio, "damping_ratio", _zero_vibration)
+    return _several(frequency, damping_ratio, "damping_ratio", partial(_zero_vibration, 1))
 
 
 def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
@@ -163,7 +164,7 @@ def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa
         >>> print(shaper.time, shaper.amplitude, shaper.residual(2.2).round(3))
         [0.   0.25 0.5 ] [0.25 0.5  0.25] 0.024
     """
-    return _several(frequency, damping_ratio, "damping_ratio", _zero_vibration_and_derivative)
+    return _several(frequency, damping_ratio, "damping_ratio", partial(_zero_vibration, 2))
 
 
 def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N802
@@ -206,21 +207,12 @@ def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[
     return reduce(mul, (make(float(f), float(o)) for f, o in each))
 
 
-def _zero_vibration(frequency: float, damping_ratio: float) -> Shaper:
-    half, decay = _half_period(frequency, damping_ratio)
-    return Shaper([0.0, half], np.array([1.0, decay]) / (1.0 + decay), [frequency])
-
-
-def _zero_vibration_and_derivative(frequency: float, damping_ratio: float) -> Shaper:
-    half, decay = _half_period(frequency, damping_ratio)
-    shares = np.array([1.0, 2.0 * decay, decay**2]) / (1.0 + decay) ** 2
-    return Shaper([0.0, half, 2.0 * half], shares, [frequency])
-
-
-def _half_period(frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """Half a period of the damped vibration [s], and the ratio by which the amplitude decreases in it."""
+def _zero_vibration(order: int, frequency: float, damping_ratio: float) -> Shaper:
+    """Convolution of `order` shapers with two impulses, half a period of the damped vibration apart."""
     root = np.sqrt(1.0 - damping_ratio**2)
-    return 0.5 / (frequency * root), float(np.exp(-np.pi * damping_ratio / root))
+    decay = float(np.exp(-np.pi * damping_ratio / root))  # ratio of the amplitudes after and before half a period
+    shares = np.array([comb(order, k) * decay**k for k in range(order + 1)]) / (1.0 + decay) ** order
+    return Shaper(0.5 / (frequency * root) * np.arange(order + 1), shares, [frequency])
 
 
 def _extra_insensitive(frequency: float, tolerance: float) -> Shaper:

@@ -111,9 +111,8 @@ def single_state(state: Equilibrium) -> Equilibrium:
 def check_solved(state: Equilibrium) -> None:
     """Reject `state` if it has no lengths."""
     if np.isnan(state.unstrained_length).any():
-        raise InvalidValueError(
-            "state", "a state without lengths", "a state that was solved", "See the status of the plan."
-        )
+        step = "See the status of the plan."
+        raise InvalidValueError("state", "a state without lengths", "a state that was solved", step)
 
 
 def check_model(state: Equilibrium) -> None:

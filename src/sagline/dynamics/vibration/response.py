@@ -95,9 +95,8 @@ class Receptance(NamedTuple):
             inside, bare = _driven_stiffness_with_loss(components.plane, square, loss, lost, scaled)
             still[:, components.taut] = _in_world(bare, components.axes[:, ::2])
             inside += bare
-        moving[:, components.taut] += _in_world(inside, components.axes[:, ::2]) + _in_world(
-            aside, components.axes[:, 1:2]
-        )
+        across = _in_world(aside, components.axes[:, 1:2])
+        moving[:, components.taut] += _in_world(inside, components.axes[:, ::2]) + across
         return moving, still
 
 
@@ -246,9 +245,8 @@ class ResponseCurves(NamedTuple):
         state = instance(vibration, Vibration, "vibration").state
         if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
             reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
-            raise InvalidValueError(
-                "vibration", reason, "a stable state with modes", "Use another state or a higher up_to."
-            )
+            step = "Use another state or a higher up_to."
+            raise InvalidValueError("vibration", reason, "a stable state with modes", step)
         _places(force, motion)
         natural = np.concatenate((vibration.frequency, modes(state).frequency))
         found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)

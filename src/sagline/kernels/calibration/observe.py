@@ -10,7 +10,7 @@ import math
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.factors import dot, factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
@@ -265,10 +265,7 @@ def _move_into_balance(along: Array, factor: Array, load: Array, tau: Array, lea
     solve_lower(factor, load)
     solve_upper(factor, load)
     for i in range(m):
-        change = 0.0
-        for j in range(n):
-            change += along[i, j] * load[j]
-        tau[i] = max(tau[i] - change, least[i])
+        tau[i] = max(tau[i] - dot(along[i], load), least[i])
 
 
 @formula

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d
@@ -284,8 +285,7 @@ def _record_chain_step(run: _ChainRun, records: Records, stock: Array) -> None:
         at[progress.FAILED], at[ENDED] = blamed + 1, GROWN
     if r < states.shape[0]:
         turning = rigid_body.spin(state, run.inertia)
-        for k in range(rigid_body.MOMENTUM):
-            states[r, k] = state[k]
+        copy(state[: rigid_body.MOMENTUM], states[r])
         for k in range(3):
             states[r, rigid_body.MOMENTUM + k] = turning[k]
         energies[r, progress.KINETIC], energies[r, progress.POTENTIAL] = kinetic, potential

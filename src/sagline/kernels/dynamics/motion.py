@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes, tables
+from sagline.kernels.algebra.factors import copy, norm
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import cable_geometry
@@ -324,8 +325,7 @@ def cable_loads(
     if losses[0] > 0.0 or losses[1] > 0.0:
         _damp_cables(losses, gravity, cables, rows, state[VELOCITY:], now, lost, terms.behind)
     unsolved = 0
-    for k in range(6):
-        wrench[k] = lost[k]
+    copy(lost, wrench)
     for i in range(cables.shape[0]):
         add_force(rows, i, -rows[g.HORIZONTAL, i], -rows[g.VERTICAL, i], wrench)
         if rows[g.STATUS, i] not in (codes.CABLE_SOLVED, codes.CABLE_SLACK):
@@ -362,8 +362,7 @@ def _record_step(run: _MasslessRun, records: Records) -> None:
                 at[progress.FAILED] = i + 1
     if row < states.shape[0]:
         turning = rigid_body.spin(state, run.inertia)
-        for k in range(rigid_body.MOMENTUM):
-            states[row, rigid_body.CENTER + k] = state[rigid_body.CENTER + k]
+        copy(state[: rigid_body.MOMENTUM], states[row])
         for k in range(3):
             states[row, rigid_body.MOMENTUM + k] = turning[k]
         for i in range(rows.shape[1]):
@@ -413,11 +412,9 @@ def _runge_kutta_step(run: _MasslessRun, now: float) -> None:
                 rows[g.LENGTH, i] = run.lengths_base[0, i] + length
                 drives.now[d.RATE, i] = run.lengths_base[1, i] + speed
         if stage == 3:
-            scale = 0.0
-            for k in range(4):
-                scale += state[rigid_body.TURN + k] * state[rigid_body.TURN + k]
-            for k in range(4):
-                state[rigid_body.TURN + k] /= math.sqrt(scale)
+            size = norm(state[rigid_body.TURN : rigid_body.VELOCITY])
+            for k in range(rigid_body.TURN, rigid_body.VELOCITY):
+                state[k] /= size
         _fill_forces(run, now + ahead)
     drives.audit[d.SUPPLIED] += h * supplied
     drives.audit[d.LOST] += h * lost
@@ -443,8 +440,7 @@ def _splitting_step(run: _MasslessRun, now: float) -> None:
     rigid_body.kick_body(run.state, run.inertia, run.gradient, half)
     if run.work & DAMPED:  # adjoint of the first kick, with one correction of the damping
         _fill_damping(run)
-        for k in range(6):
-            run.before[k] = run.damping[k]
+        copy(run.damping, run.before)
         rigid_body.kick_body(run.state, run.inertia, run.damping, half)
         _fill_damping(run)
         rigid_body.kick_body(run.state, run.inertia, run.before, -half)
@@ -465,8 +461,7 @@ def _start_run(run: _MasslessRun, records: Records, room: Array) -> None:
     _fill_set_points(run, time, progress.MOMENT * run.step)
     _fill_damping(run)
     if at[progress.STEPS] == 0:
-        for i in range(now.shape[1]):
-            now[d.FILTERED, i] = now[d.AT_FRAME, i]
+        copy(now[d.AT_FRAME], now[d.FILTERED])
     progress.note_events(run.drives, run.rows, run.cables, at, time, _cable_gravity(run), records[4])
     _record_step(run, records)
 

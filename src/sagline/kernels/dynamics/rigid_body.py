@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
+from sagline.kernels.algebra.factors import dot
 from sagline.kernels.jit import entry, formula
 from sagline.kernels.statics import turned
 
@@ -91,11 +92,9 @@ def spin(state: Array, inertia: Array) -> Triple:
 def kinetic_energy(state: Array, inertia: Array) -> float:
     """Kinetic energy of translation and rotation [J]."""
     x, y, z = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
-    speed2 = 0.0
-    for k in range(3):
-        speed2 += state[VELOCITY + k] * state[VELOCITY + k]
+    velocity = state[VELOCITY:MOMENTUM]
     turning = x * x / inertia[MOMENTS] + y * y / inertia[MOMENTS + 1] + z * z / inertia[MOMENTS + 2]
-    return 0.5 * (inertia[MASS] * speed2 + turning)
+    return 0.5 * (inertia[MASS] * dot(velocity, velocity) + turning)
 
 
 @formula

@@ -15,7 +15,7 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes
-from sagline.kernels.algebra.factors import factorize, orthogonal_factor, pseudo_inverse
+from sagline.kernels.algebra.factors import copy, dot, factorize, orthogonal_factor, pseudo_inverse
 from sagline.kernels.cable import sag_forces
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
@@ -42,10 +42,7 @@ def _section_of(range_: Array, i: int) -> sag_forces.Section:
 @formula
 def component_along(columns: Array, direction: Array, i: int) -> float:
     """Component of column `i` of a matrix along `direction`."""
-    total = 0.0
-    for k in range(direction.size):
-        total += direction[k] * columns[k, i]
-    return total
+    return dot(direction, columns[:, i])
 
 
 @kernel
@@ -146,8 +143,7 @@ def _least_certain(curves: sag_forces.Curves, range_: Array) -> tuple[int, float
 def _split_range(curves: sag_forces.Curves, waiting: Array, top: int, i: int, tau: float) -> None:
     """Split the tension range of cable `i` in two. The half that contains the tension `tau` is examined next."""
     for row in range(RANGE_ROWS):
-        for j in range(waiting.shape[2]):
-            waiting[top + 1, row, j] = waiting[top, row, j]
+        copy(waiting[top, row], waiting[top + 1, row])
     low, high = waiting[top, LEAST, i], waiting[top, LARGEST, i]
     middle = math.sqrt(low * high) if low > 0.0 else 0.5 * high
     sag_force = sag_forces.sag_force_at(curves, i, middle)
@@ -213,8 +209,7 @@ def decide_feasibility(
     trial = TensionChange(tau[0, :m], sag_force, tau[1, :n], tau[2, :n])
     _first_range(curves, demand.size, ranges[0])
     sag_forces.find_extrema(curves, ranges[0, LEAST], ranges[0, LARGEST], rest)
-    for i in range(m):
-        trial.tau[i] = change.tau[i]
+    copy(change.tau, trial.tau)
     enough = math.inf
     top = 0
     for node in range(nodes):
@@ -223,18 +218,15 @@ def decide_feasibility(
         if node == 0 and not (demand.size < math.inf and left == left):
             return codes.POSE_NOT_CONVERGED, 0.0, math.inf, False
         if node == 0 or (balanced and left < enough):
-            for i in range(m):
-                change.tau[i] = trial.tau[i]
-            for k in range(n):
-                change.residual[k] = trial.residual[k]
+            copy(trial.tau, change.tau)
+            copy(trial.residual, change.residual)
         if balanced:
             enough = min(enough, left)
         if balanced and left <= FEASIBLE * demand.size:
             return codes.POSE_SOLVED, 0.0, 0.0, False
         spare = _spare_capacity(curves, demand, range_, trial.direction, tops)
         if node == 0:
-            for k in range(n):
-                change.direction[k] = trial.direction[k]
+            copy(trial.direction, change.direction)
             if spare < 0.0:
                 return codes.POSE_INFEASIBLE, -spare if left < math.inf else math.inf, enough, True
         _, before = _least_certain(curves, range_)

@@ -106,10 +106,7 @@ def _fill_residual(curves: Curves, demand: Demand, tau: Array, sag_force: Array,
 @formula
 def norm_of_part(vector: Array, first: int, last: int) -> float:
     """Euclidean length of the entries `first` to `last` - 1 of `vector`."""
-    total = 0.0
-    for k in range(first, last):
-        total += vector[k] * vector[k]
-    return math.sqrt(total)
+    return factors.norm(vector[first:last])
 
 
 @glue
@@ -259,8 +256,7 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
     for i in range(m):
         change.tau[i] = trial[i]
         change.sag_force[i] = trial_sag_force[i]
-    for k in range(n):
-        change.residual[k] = left[k]
+    factors.copy(left, change.residual)
     return True
 
 

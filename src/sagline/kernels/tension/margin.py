@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
+from sagline.kernels.algebra.factors import dot, norm, normalize_row, orthogonalize_row
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
@@ -66,9 +66,7 @@ def complete_frame(frame: Array, triangle: Array) -> None:
     best = 0
     least = math.inf
     for k in range(n):
-        covered = 0.0
-        for b in range(n - 1):
-            covered += frame[b, k] * frame[b, k]
+        covered = dot(frame[: n - 1, k], frame[: n - 1, k])
         if covered < least:
             least, best = covered, k
     for k in range(n):
@@ -79,13 +77,9 @@ def complete_frame(frame: Array, triangle: Array) -> None:
 @formula
 def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
     """Largest values of normal . J t and of -normal . J t over all tensions t within their limits; may be infinite."""
-    n, m = matrix.shape
-    forward = 0.0
-    backward = 0.0
-    for i in range(m):
-        along = 0.0
-        for k in range(n):
-            along += normal[k] * matrix[k, i]
+    forward = backward = 0.0
+    for i in range(matrix.shape[1]):
+        along = dot(normal, matrix[:, i])
         least = along * low[i]
         most = along * high[i] if abs(along) > ALONG else least
         forward += max(least, most)
@@ -115,14 +109,8 @@ def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
         held = extend_frame(matrix, chosen, held, frame, triangle)
         if held == n - 1:
             complete_frame(frame, triangle)
-            force = 0.0
-            along = 0.0
-            for k in range(n):
-                along += normal[k] * needed[k]
-                if k < translations:
-                    force += normal[k] * normal[k]
-            if force > 1e-18:
-                force = math.sqrt(force)
+            along, force = dot(normal, needed), norm(normal[:translations])
+            if force > 1e-9:
                 forward, backward = zonotope_reach(matrix, low, high, normal)
                 least = min(least, (forward - along) / force, (backward + along) / force)
         changed = next_choice(chosen, m)

@@ -11,7 +11,14 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound
-from sagline.kernels.algebra.factors import factor_positive, normalize_row, orthogonalize_row, solve_lower, solve_upper
+from sagline.kernels.algebra.factors import (
+    dot,
+    factor_positive,
+    normalize_row,
+    orthogonalize_row,
+    solve_lower,
+    solve_upper,
+)
 from sagline.kernels.algebra.programs import LP_SOLVED, lowest_point
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
@@ -127,9 +134,7 @@ def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -
         for k in range(r):
             step[k] = -slope[k]
         solve_lower(curve, step)
-        decrement = 0.0
-        for k in range(r):
-            decrement += step[k] * step[k]
+        decrement = dot(step, step)
         solve_upper(curve, step)
         share = 1.0 if decrement < 0.0625 else 1.0 / (1.0 + math.sqrt(decrement))
         for k in range(r):

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.factors import dot, factor_positive, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
 from sagline.kernels.cable.states import is_limited_by_strain, least_of_sag
@@ -415,9 +415,7 @@ def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ran
 def in_wrench_space(rows: Array, vector: Array, full: Array) -> None:
     """Fill the direction `full` (6,) of wrenches from `vector` (n,), a direction along the free motions."""
     for a in range(6):
-        full[a] = 0.0
-        for k in range(vector.size):
-            full[a] += rows[k, a] * vector[k]
+        full[a] = dot(rows[:, a], vector)
 
 
 @kernel

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.bounds import START
-from sagline.kernels.algebra.factors import copy, solve_general
+from sagline.kernels.algebra.factors import copy, dot, norm, solve_general
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
 from sagline.kernels.cable.states import TensionLimits
 from sagline.kernels.cable.terms import Model
@@ -180,7 +180,7 @@ def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, l
             count += 1
             if count < n:
                 for k in range(n):
-                    matrix[k, count - 1] = _component(platform.freedom, k, columns, i)
+                    matrix[k, count - 1] = dot(platform.freedom[k], columns[:, i])
         else:
             for a in range(6):
                 wrench[a] -= columns[a, i] * math.copysign(facet.width[i], along)
@@ -208,15 +208,6 @@ def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, l
 
 
 @glue
-def _component(freedom: Array, k: int, columns: Array, i: int) -> float:
-    """Component of column `i` of `columns` (6, m), a wrench, along the free motion `k`."""
-    total = 0.0
-    for a in range(6):
-        total += freedom[k, a] * columns[a, i]
-    return total
-
-
-@glue
 def _fill_load(freedom: Array, facet: LimitingFacet, load: Array) -> None:
     """Fill the load e (n,) along the free motions, with y . e = 1. The load is a moment if y has no force part."""
     y = facet.direction
@@ -241,10 +232,7 @@ def _largest_multiple(
     rows, rest = block(memory, 2 * n + 4, m)
     vectors, rest = block(rest, 4, n)
     mirror, right = vectors[0], vectors[1]
-    length = 0.0
-    for k in range(n):
-        length += load[k] * load[k]
-    length = math.sqrt(length)
+    length = norm(load)
     further = max(FURTHER * above, demand.size * EXACT)
     if not further < math.inf or not length > 0.0:
         return math.nan
@@ -285,9 +273,6 @@ def _largest_multiple(
 @glue
 def _reflect_vector(mirror: Array, square: float, vector: Array) -> None:
     """Reflect `vector` at the plane with the normal `mirror` (n,), whose squared length is `square`."""
-    along = 0.0
-    for k in range(vector.size):
-        along += mirror[k] * vector[k]
-    along *= 2.0 / square
+    along = dot(mirror, vector) * (2.0 / square)
     for k in range(vector.size):
         vector[k] -= along * mirror[k]

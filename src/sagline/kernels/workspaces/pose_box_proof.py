@@ -14,7 +14,7 @@ import numpy as np
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.factors import copy, norm, solve_lower, solve_upper
+from sagline.kernels.algebra.factors import copy, dot, norm, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.sag_forces import Curves, new_curves
@@ -121,10 +121,7 @@ def _proves_inside(
         for motion in range(MOTIONS):
             coefficients[motion] = dot6(slopes[motion], along)
         first = most_of_linear(box, coefficients)
-        left = 0.0
-        for k in range(n):
-            left += room.inverse[i, k] * centered.left[k]
-        first += abs(left) + precision.rounding * room.size[i] * largest
+        first += abs(dot(room.inverse[i], centered.left)) + precision.rounding * room.size[i] * largest
         inexact = room.size[i] * error / (1.0 - error) * reaching
         bends = _fill_changes(place, ranges, tau, along, inexact, precision.bends, room.change[i], room.hanging[i])
         most = reach_of_loads(loads, along)
@@ -211,15 +208,13 @@ def _fill_changes(
 def _keeps_limits(place: CablesInBox, curves: Curves, tau: Array, room: _TensionBox, rounding: float) -> bool:
     """True if a box of tensions within the limits contains all changes that the tensions of the box cause."""
     trial, low, sag_force = room.trial, room.low, room.sag_force
-    for i in range(tau.size):
-        trial[i] = room.sum[i]
+    copy(room.sum, trial)
     for _ in range(ITERATIONS):
         for i in range(tau.size):
             low[i] = room.sum[i]
             for j in range(tau.size):
                 low[i] += room.change[i, j] * trial[j]
-        for i in range(tau.size):
-            trial[i] = low[i]
+        copy(low, trial)
     for i in range(tau.size):
         trial[i] = min(room.slack[i], HEADROOM * trial[i])
         low[i] = tau[i] - trial[i]
@@ -269,9 +264,7 @@ def _proves_outside(
     for k in range(n):
         y[k] = centered.left[k] / length
     for i in range(m):
-        along = 0.0
-        for k in range(n):
-            along += y[k] * place.matrix[k, i]
+        along = dot(y, place.matrix[:, i])
         borne = abs(along) + BORNE * length / (centered.high[i] - centered.low[i])
         give[i] = 1.0 / (borne * borne)
     if not factor_normal(place.matrix, give, 1.0, centered.normal):
@@ -316,9 +309,7 @@ def _turn_direction(
     n, m = place.matrix.shape
     columns = place.slopes[motion].reshape((6, m))
     for i in range(m):
-        work[i] = 0.0
-        for a in range(6):
-            work[i] += columns[a, i] * direction[a]
+        work[i] = dot6(columns[:, i], direction)
     for k in range(n):
         turn[k] = 0.0
         for i in range(m):
@@ -383,9 +374,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
             square += length * length
     turned_arm += box.turn * math.sqrt(square)
     for i in range(m):
-        value = 0.0
-        for a in range(6):
-            value += direction[a] * place.full[a, i]
+        value = dot6(direction, place.full[:, i])
         x, y, z = _at_platform_end(place, i, direction)
         leading, hanging_leading, going = 0.0, 0.0, 0.0
         square, square_value, square_hanging = 0.0, 0.0, 0.0

@@ -16,6 +16,7 @@ import math
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
@@ -213,8 +214,7 @@ def _facet_weights(
 ) -> facets.FacetWeights:
     """Weights of the cables for all facets; `rows` and `middle` are filled."""
     endless = curved = False
-    for a in range(6):
-        middle[a] = center[a]
+    copy(center, middle)
     middle[2] -= body[tables.MASS] * body[tables.GRAVITY]
     for i in range(bands.shape[1]):
         limited = bands[sag.HIGH, i] < math.inf
@@ -449,9 +449,7 @@ def _limiting_cable(counts: facets.FacetWeights, direction: Array) -> int:
     cable = -1
     most = 0.0
     for i in range(counts.rows.shape[1]):
-        along = 0.0
-        for k in range(6):
-            along += counts.rows[facets.COLUMN + k, i] * direction[k]
+        along = wrench_set.dot6(counts.rows[facets.COLUMN :, i], direction)
         if abs(along) > most:
             most = abs(along)
             cable = i

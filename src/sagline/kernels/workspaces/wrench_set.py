@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
@@ -61,8 +62,7 @@ def reach_of_loads(loads: Loads, against: Array) -> float:
 @kernel
 def farthest(loads: Loads, against: Array, wrench: Array) -> None:
     """Fill `wrench` (6,), the wrench of the set with the largest component opposite to the direction `against`."""
-    for a in range(6):
-        wrench[a] = loads.center[a]
+    copy(loads.center, wrench)
     for s in range(loads.segments.shape[0]):
         sign = -1.0 if dot6(loads.segments[s], against) > 0.0 else 1.0
         for a in range(6):
