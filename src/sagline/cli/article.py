@@ -42,9 +42,8 @@ def run(files: opt.Files = opt.Files()) -> int:
     robots = [sl.load_robot(name) for name in ROBOTS]
     plans = [run_name(robot, model) for robot in robots for model in models]
     hulls = [f"{name}.glb" for name in HULLS]
-    output = Output(
-        files, "", [*(f"{name}.nc" for name in plans), *hulls], [*FIGURES, *HULLS], *(f"{name}.csv" for name in plans)
-    )
+    parts = [*(f"{name}.nc" for name in plans), *hulls]
+    output = Output(files, "", parts, [*FIGURES, *HULLS], *(f"{name}.csv" for name in plans))
     path, runs = sl.article_path(), []
     with working("planning the article's path, and confirming it with exact cables") as line:
         for robot in robots:

@@ -59,10 +59,8 @@ def identify(
             unknowns=["linear_density", "axial_stiffness", *["length_offset"] * offset],
         )
         model = _model(cable, data)
-    rows = [
-        (name, float(value), float(error), UNITS[name])
-        for name, value, error in zip(cable.names, cable.values, cable.standard_error, strict=True)
-    ]
+    numbers = zip(cable.names, cable.values, cable.standard_error, strict=True)
+    rows = [(name, float(value), float(error), UNITS[name]) for name, value, error in numbers]
     for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
         rows.append((name, estimate.value, estimate.high - estimate.value, unit))
     output.table(TABLE, lambda: [("name", "value", "standard error", "unit"), *rows])
@@ -71,9 +69,8 @@ def identify(
         return
     texts = [[name, number_text(value, ".5g"), number_text(error, ".2g"), unit] for name, value, error, unit in rows]
     verdict = f"chi-squared per degree of freedom: {number_text(cable.chi_squared, '.3g')}"
-    grid = TextTable(
-        ["", "value", "standard error", "unit"], texts, f"{len(data.span)} measurements", left=frozenset({0, 3})
-    )
+    title = f"{len(data.span)} measurements"
+    grid = TextTable(["", "value", "standard error", "unit"], texts, title, left=frozenset({0, 3}))
     show_table(grid, f"{verdict} (about 1 if the standard errors are right)")
     show_text(
         f"The empirical model with k_h, k_p has position errors below {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
@@ -87,9 +84,7 @@ def identify(
 def _model(cable: sl.CableFit, data: Measurements) -> sl.EmpiricalFit:
     """The empirical model over the measured range of spans, rises and tensions."""
     horizontal = data.tension * data.span / np.hypot(data.span, data.rise)
-    spans, rises, tensions = (
-        np.linspace(values.min(), values.max(), STEPS) for values in (data.span, data.rise, horizontal)
-    )
+    spans, rises, tensions = (np.linspace(each.min(), each.max(), STEPS) for each in (data.span, data.rise, horizontal))
     return sl.identify_empirical(cable.cable, spans, rises, tensions)
 
 

@@ -82,10 +82,8 @@ def _tell(done: sl.control.Execution) -> None:
     show_table(TextTable(["largest", "value", "cable", "at [s]"], largest))
     show_table(TextTable(["cycles by their delay", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
     if done.events:
-        rows = [
-            [f"{_since(done, each.time):.2f}", f"{each.kind} {each.name}", each.text]
-            for each in done.events[:MOST_EVENTS]
-        ]
+        events = done.events[:MOST_EVENTS]
+        rows = [[f"{_since(done, each.time):.2f}", f"{each.kind} {each.name}", each.text] for each in events]
         show_table(TextTable(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
     if len(done.events) > MOST_EVENTS:
         show_text(f"… and {len(done.events) - MOST_EVENTS:,} more events: --to FILE.nc has all of them.")

@@ -119,9 +119,8 @@ class _Command(TyperCommand):
     def get_help(self, ctx: Any) -> str:
         ctx.formatter_class = _Formatter
         usage, _, rest = super().get_help(ctx).partition("\n\n")
-        rest = re.sub(
-            r"^(  [A-Z.\[\]]\S*) <([^>]+)>", lambda found: found[1].ljust(len(found[0])), rest, flags=re.MULTILINE
-        )
+        argument = r"^(  [A-Z.\[\]]\S*) <([^>]+)>"
+        rest = re.sub(argument, lambda found: found[1].ljust(len(found[0])), rest, flags=re.MULTILINE)
         return f"{re.sub(r'[{}]', '', usage)}\n\n{rest}"
 
 
@@ -162,7 +161,7 @@ class _Group(TyperGroup):
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run a subcommand; `--debug` may be at any place."""
         words = (sys.argv[1:] if args is None else list(args)) or ["--help"]
-        debug = DEBUG in words
+        debug, words = DEBUG in words, [word for word in words if word != DEBUG]
         alone = extra.pop("standalone_mode", True)
 
         def command() -> Any:
@@ -170,9 +169,7 @@ class _Group(TyperGroup):
 
             with notices(), finished_files() as finished:
                 try:
-                    return super(_Group, self).main(
-                        [word for word in words if word != DEBUG], *more, **{**extra, "standalone_mode": False}
-                    )
+                    return super(_Group, self).main(words, *more, **{**extra, "standalone_mode": False})
                 except Exception as error:
                     if finished:
                         error.add_note(_before(finished))

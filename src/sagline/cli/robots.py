@@ -54,9 +54,8 @@ def robots(files: opt.TableFiles = opt.TableFiles()) -> None:
         for frame, platform in [(_frame(robot), _platform(robot))]
     ]
     show_table(TextTable(heads, rows, left=frozenset({0, 2, 4, 5})), f"{len(robots)} preset robots.")
-    show_text(
-        "Frame: length × width × height above the floor. If the source gives no size: the box around the anchors."
-    )
+    frame = "length × width × height above the floor. If the source gives no size: the box around the anchors."
+    show_text(f"Frame: {frame}")
     show_text("")
     for robot in robots:
         show_text(robot.name, style="bold")

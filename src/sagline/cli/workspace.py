@@ -178,9 +178,7 @@ def _tell(space: sl.Workspace, proof: sl.Proof | None) -> None:
     if proof is not None:
         spans = span_of(proof.box)
         shares = {"proved inside": proof.inside, "proved outside": proof.outside, "open": proof.open}
-        rows = [
-            [word, number_text(100.0 * share, ".2f"), f"{share * proof.volume:.4g}"] for word, share in shares.items()
-        ]
+        rows = [[word, number_text(100.0 * part, ".2f"), f"{part * proof.volume:.4g}"] for word, part in shares.items()]
         show_table(TextTable([f"{spans} m", "share [%]", "volume [m³]"], rows))
         show_text(f"{proof.verdict.name}: {proof.verdict.text}.")
 

@@ -126,10 +126,8 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
         _mark_outliers(ax, found, quantity)
         format_axes(ax, "", f"{label} [$\\sigma$]")
         ax.grid(visible=False)
-        if far:
-            ax.set_ylim(-1.12 * REACH, 1.12 * REACH)
-        else:
-            ax.set_ylim(*(np.array([-1.0, 1.0]) * max(2.5, 1.1 * float(np.nanmax(np.abs(values[shown]))))))
+        top = 1.12 * REACH if far else max(2.5, 1.1 * float(np.nanmax(np.abs(values[shown]))))
+        ax.set_ylim(-top, top)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     every = f", every {-(-len(found.rows) // MOST_POSES)}th is drawn" if len(shown) < len(found.rows) else ""
     panels[-1].set_xlabel(f"row of the log{every}", fontsize=current().label)
@@ -198,10 +196,8 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
         is_known = bool(np.isfinite(values).any())
         median = f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if is_known else "not observed"
         draw_map(ax, x, y, values, scale, f"{name}, {median}")
-    places = found.poses.position[:: -(-len(found.rows) // MOST_POSES)]
-    panels[1].plot(
-        places[:, 0], places[:, 1], ".", color="white", markeredgecolor="0.2", markeredgewidth=0.4, markersize=4.0
-    )
+    across, up, _ = found.poses.position[:: -(-len(found.rows) // MOST_POSES)].T
+    panels[1].plot(across, up, ".", color="white", markeredgecolor="0.2", markeredgewidth=0.4, markersize=4.0)
     shown, label = ScalarMappable(scale, MAP_COLORS), "expected position error [mm]"
     bar = color_bar(shown, list(panels), label, shrink=0.85, pad=0.02, format=ROUND)
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -219,10 +215,8 @@ def _height_of_maps(found: Calibration) -> float:
 
 def _before(found: Calibration) -> Calibration:
     """Calibration object for the state before: uncalibrated robot, prior values and prior deviations."""
-    numbers = found.parameters
-    return replace(
-        found, robot=found.before, values=numbers.prior, covariance=locked(np.diag(numbers.prior_deviation**2))
-    )
+    covariance = locked(np.diag(found.parameters.prior_deviation**2))
+    return replace(found, robot=found.before, values=found.parameters.prior, covariance=covariance)
 
 
 def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:

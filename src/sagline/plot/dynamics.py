@@ -174,9 +174,8 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
     for ax, row in zip(panels.flat, rows, strict=True):
         sheet.draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
-    sheet.color_bar(
-        ScalarMappable(scale, sheet.MAP_COLORS), list(panels.flat), label, shrink=0.8, location="bottom", aspect=30
-    )
+    drawn = ScalarMappable(scale, sheet.MAP_COLORS)
+    sheet.color_bar(drawn, list(panels.flat), label, shrink=0.8, location="bottom", aspect=30)
     set_heading(figure, found.robot.name)
     return figure
 

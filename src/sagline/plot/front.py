@@ -50,9 +50,8 @@ def _draw_course(ax: Axes, front: Front) -> None:
     values = front.evaluated_values[:, 0]
     number = np.arange(len(values))
     ax.plot(number, values, ".", color=GAP_COLOR, markersize=3.0, label="candidates", linestyle="none")
-    ax.plot(
-        number, _best_until(values, highest=front.goals[0].maximize), color=BLUE, linewidth=1.4, label="best so far"
-    )
+    best = _best_until(values, highest=front.goals[0].maximize)
+    ax.plot(number, best, color=BLUE, linewidth=1.4, label="best so far")
     ax.axhline(front.start_values[0], color=VERMILLION, linewidth=1.0, linestyle="--", label="start")
     format_axes(ax, "candidate", _label_of(front.goals[0]))
     known = values[np.isfinite(values)]

@@ -149,9 +149,8 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
     if ax is None:
         ax = sheet(height=4.0).add_subplot(projection="3d")
     plan, points = draw_robot(ax, robot, where)
-    format_space_axes(
-        ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits balance this pose"
-    )
+    remark = "" if plan.feasible else ": no tensions within the limits balance this pose"
+    format_space_axes(ax, points, robot.name + remark)
     if plan.feasible:
         tension_bar(ax, TensionScale.of(robot), plan.chord_tension, "left")
     return ax

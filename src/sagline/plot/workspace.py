@@ -288,9 +288,8 @@ def workspace(space: Workspace) -> Figure:
     _draw_hull(ax, space, colors)
     points = np.concatenate((points, space.surface.vertices))
     format_space_axes(ax, points, "")
-    ax.set_box_aspect(
-        [np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=0.78 if narrow else 1.0
-    )
+    sides = [np.ptp(ends) for ends in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
+    ax.set_box_aspect(sides, zoom=0.78 if narrow else 1.0)
     for each in ax.get_children():
         each.set_clip_on(False)
     set_heading(figure, f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {orientations_text(space)}")
@@ -349,11 +348,8 @@ def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
 
 def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, Color]) -> None:
     """Draw the shares of the limits in the surface as bars. The largest share is at the top."""
-    keys = [(limit.number, limit.cable) for limit in space.limits]
-    bars = [
-        (_limit_name(key, space), 100.0 * limit.share, colors[key])
-        for key, limit in zip(keys, space.limits, strict=True)
-    ]
+    shown = {(limit.number, limit.cable): 100.0 * limit.share for limit in space.limits}
+    bars = [(_limit_name(key, space), share, colors[key]) for key, share in shown.items()]
     if len(bars) > MOST_LIMITS:
         rest = sum(share for _, share, _ in bars[MOST_LIMITS - 1 :])
         bars = [*bars[: MOST_LIMITS - 1], (REST, rest, to_rgb(GAP_COLOR))]

@@ -131,15 +131,13 @@ def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
         look, several = _SHOWN[verdict]
         text = verdict if counts[verdict] == 1 else several
         tiles += f'<li class="{look}"><strong>{counts[verdict]}</strong> {text}</li>'
-    head = '<th scope="col">chapter</th>' + "".join(
-        f'<th scope="col"><span>{verdict}</span></th>' for verdict in verdicts
-    )
+    names = ["chapter", *(f"<span>{verdict}</span>" for verdict in verdicts)]
+    head = "".join(f'<th scope="col">{name}</th>' for name in names)
     rows = ""
     for number, chapter in enumerate(chapters, start=1):
         found = Counter(finding.verdict for finding in chapter.findings)
         cells = "".join(f'<td class="{_SHOWN[verdict][0]}">{found[verdict] or ""}</td>' for verdict in verdicts)
-        name = f'<a href="#{chapter.key}">{number}. {_text(chapter.title)}</a>'
-        rows += f'<tr><th scope="row">{name}</th>{cells}</tr>'
+        rows += f'<tr><th scope="row">{_link(number, chapter)}</th>{cells}</tr>'
     return (
         f'<section class="result" aria-label="Result">\n<ul class="tiles">{tiles}</ul>\n<div class="beside">\n'
         f'<div class="scroll" tabindex="0"><table class="counts"><thead><tr>{head}</tr></thead>'
@@ -155,10 +153,12 @@ def _contents(chapters: Sequence[Chapter]) -> str:
             f'<li><a href="#{finding.key}">{_text(_headline(finding))}</a> {_badge(finding)}</li>'
             for finding in chapter.findings
         )
-        parts.append(
-            f'<section><h3><a href="#{chapter.key}">{number}. {_text(chapter.title)}</a></h3><ul>{lines}</ul></section>'
-        )
+        parts.append(f"<section><h3>{_link(number, chapter)}</h3><ul>{lines}</ul></section>")
     return f'<nav aria-label="All findings">\n<h2>All findings</h2>\n<div>{"".join(parts)}</div>\n</nav>'
+
+
+def _link(number: int, chapter: Chapter) -> str:
+    return f'<a href="#{chapter.key}">{number}. {_text(chapter.title)}</a>'
 
 
 def _chapter(number: int, chapter: Chapter) -> str:

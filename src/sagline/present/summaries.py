@@ -187,10 +187,8 @@ def _when(plan: Plan, first: int, last: int) -> str:
 def _(state: Equilibrium) -> Summary:
     known = np.isfinite(state.unstrained_length).all(axis=-1)
     where = f"at {_place(state.pose)} m" if not known.shape else f"{known.sum():,} of {known.size:,} with lengths"
-    lines = (
-        f"chord tensions {_range(state.chord_tension)}",
-        f"cable model {word_of(type(state.cables.model).__name__)}",
-    )
+    model = word_of(type(state.cables.model).__name__)
+    lines = f"chord tensions {_range(state.chord_tension)}", f"cable model {model}"
     return Summary(f"Equilibrium of {first_of(state.robot).name}", where, None, lines)
 
 

@@ -37,7 +37,6 @@ WIDE: Final = 640.0  # px
 EDGE: Final = 12.0  # px, margin
 _RIGHT: Final = np.array([0.9, 0.436, 0.0])
 _UP: Final = np.array([-0.154, 0.318, 0.936])
-_EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2, 4)]
 
 
 def drawing_data(robot: Robot) -> dict[str, Any]:
@@ -55,10 +54,8 @@ def model_data(robot: Robot) -> dict[str, Any]:
     pose, length, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros((1, m)), np.zeros(m)
     wrench, first, reference = (locked(each) for each in (np.zeros((1, 6)), np.zeros(1, np.int64), np.full(m, np.nan)))
     found, rest = InverseRows.empty(robot, 1), ForwardRows.empty(robot, 1)
-    given, decided = (
-        (terms, pose, wrench),
-        (first, covers_all(method.code, m - n), memory, found.answers, found.proofs),
-    )
+    given = terms, pose, wrench
+    decided = first, covers_all(method.code, m - n), memory, found.answers, found.proofs
     forward = (model.code, *model.parameters, behind), False, (*terms, length, pose, wrench), new_chain(m, n)
     draw = _draw_arguments(robot, terms, pose[0], tension)
     calls = {
@@ -180,19 +177,17 @@ def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
     """SVG drawing of frame, platform and cables at `pose`. `tension`: chord tensions (m,) [N]."""
     courses = courses_at(robot, pose, tension)
     low, high = bounds(robot)
-    frame = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
-    body = shapes.platform_solid(robot)
-    box = np.array(np.meshgrid(*zip(body.vertices.min(axis=0), body.vertices.max(axis=0), strict=True), indexing="ij"))
-    platform = pose.transform(box.reshape(3, -1).T)
+    frame, body = shapes.box_corners(low, high), shapes.platform_solid(robot).vertices
+    platform = pose.transform(shapes.box_corners(body.min(axis=0), body.max(axis=0)))
     groups = [_seen(each) for each in (frame, platform, *courses)]
     every = np.concatenate(groups)
     least, size = every.min(axis=0), np.ptp(every, axis=0)
     scale = (WIDE - 2.0 * EDGE) / size[0]
     frame, platform, *drawn_courses = (EDGE + scale * (each - least) for each in groups)
     colors = TensionScale.of(robot).colors(tension)
-    drawn = [_line(frame[[a, b]], "#7f878f", 1.5) for a, b in _EDGES]
+    drawn = [_line(frame[[b, a]], "#7f878f", 1.5) for a, b in shapes.BOX_EDGES]
     drawn += [_line(each, f"rgb({r} {g} {b})", 2.0) for each, (r, g, b) in zip(drawn_courses, colors, strict=True)]
-    drawn += [_line(platform[[a, b]], "#3a86c9", 2.5) for a, b in _EDGES]
+    drawn += [_line(platform[[b, a]], "#3a86c9", 2.5) for a, b in shapes.BOX_EDGES]
     tall = scale * size[1] + 2.0 * EDGE
     label = escape(f"{robot.name}: its platform on cables")
     head = f'<svg viewBox="0 0 {WIDE:g} {tall:.0f}" width="{WIDE:g}" role="img" aria-label="{label}">'

@@ -101,9 +101,8 @@ def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object],
         ways = [_least(column) for column in codes.T]
         planes += [_planes(code, count) for _, count, code in ways]
         columns = [(order, count) for order, count, _ in ways]
-        described.append(
-            {"name": channel.name, "scale": channel.scale, "step": channel.step, "nothing": nothing, "columns": columns}
-        )
+        about = {"name": channel.name, "scale": channel.scale, "step": channel.step}
+        described.append({**about, "nothing": nothing, "columns": columns})
     text = b64encode(zlib.compress(b"".join(planes), _LEVEL)).decode("ascii")
     return {"count": len(channels[0].values), "channels": described}, text
 

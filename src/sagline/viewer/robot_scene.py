@@ -137,9 +137,8 @@ class RobotScene:
         self._platform = self._nodes.mesh("/platform/body", *body, PLATFORM)
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
-        self._notice = self._scene.add_label(
-            "/platform/notice", "", position=(0.0, 0.0, 0.13 * self._size), visible=False, anchor="bottom-center"
-        )
+        above = 0.0, 0.0, 0.13 * self._size
+        self._notice = scene.add_label("/platform/notice", "", position=above, visible=False, anchor="bottom-center")
         self.place(home)
 
     def extent(self, pose: Pose) -> tuple[Array, Array]:

@@ -129,10 +129,8 @@ def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:
         return time, values, values
     starts = (np.arange(most) * time.size) // most
     # extreme values of the samples from each start to the next one
-    low, high = (
-        np.stack([which.reduceat(np.ascontiguousarray(line), starts) for line in values.T], axis=1)
-        for which in (np.fmin, np.fmax)
-    )
+    lines = [np.ascontiguousarray(line) for line in values.T]
+    low, high = (np.stack([which.reduceat(line, starts) for line in lines], axis=1) for which in (np.fmin, np.fmax))
     return time[starts], low, high
 
 

@@ -174,9 +174,8 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     winches = shapes.winch_solid(robot)
     if len(winches.faces):
         _add(scene, "winches", winches, DRUM)
-    for i, (radius, turn) in enumerate(
-        zip(pulleys_of(robot).radius, shapes.pulley_rotations(robot, snapshot.pose), strict=True)
-    ):
+    pulleys = zip(pulleys_of(robot).radius, shapes.pulley_rotations(robot, snapshot.pose), strict=True)
+    for i, (radius, turn) in enumerate(pulleys):
         if radius > 0.0:
             placed = compose_matrix(scale=np.full(3, radius), translate=robot.frame_anchors[i])
             _add(scene, f"pulley {i}", shapes.wheel(), DRUM, placed @ quaternion_matrix(turn))
@@ -202,9 +201,8 @@ def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], pla
 
     mesh = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
     shade = [*(int(part) for part in color[:3]), 255]
-    mesh.visual = trimesh.visual.TextureVisuals(
-        material=trimesh.visual.material.PBRMaterial(baseColorFactor=shade, metallicFactor=0.1, roughnessFactor=0.7)
-    )
+    look = trimesh.visual.material.PBRMaterial(baseColorFactor=shade, metallicFactor=0.1, roughnessFactor=0.7)
+    mesh.visual = trimesh.visual.TextureVisuals(material=look)
     scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
 
 

@@ -243,9 +243,8 @@ class PushFeature(Feature):
         """Build the folder."""
         self._page, self._size, self._nodes = page, page.size, Nodes(page.server.scene)
         self.body, self._ball = platform_solid(page.robot), ball()
-        self._stiffness = float(np.sqrt(page.scale.low * page.scale.high)) / (
-            FAR * self._size
-        )  # [N/m], force of a drag
+        mean = float(np.sqrt(page.scale.low * page.scale.high))
+        self._stiffness = mean / (FAR * self._size)  # [N/m], force of a drag
         self.hold: tuple[int, Array] | None = None  # client, and the point that it drags, platform frame [m]
         self.response: PushResponse | None = None
         self._unit = force_unit(page.robot)

@@ -97,9 +97,8 @@ class RegionFeature(Feature):
             hint = "Free travel along each axis at this orientation."
             self._travel_box: Any = gui.add_checkbox("Where can I go", False, hint=hint)
             self._travel_html = gui.add_html(_NOTHING)
-        page.refresh_on(
-            self._force, self._moment, self._region_box, self._color, self._slice_box, self._plane, self._travel_box
-        )
+        boxes = self._region_box, self._slice_box, self._travel_box
+        page.refresh_on(self._force, self._moment, self._color, self._plane, *boxes)
 
     @property
     def _without(self) -> str:
