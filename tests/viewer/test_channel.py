@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from sagline.viewer.server import LONGEST, NAME, Channel, PageServer, chosen_by, start_server, stop_server
+from sagline.viewer.readout import chosen_by
+from sagline.viewer.server import LONGEST, NAME, Channel, PageServer, start_server, stop_server
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import handle
 

@@ -16,7 +16,8 @@ from sagline.core.arrays import locked
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.missing import NearestFeasible, explanation, missing_label, nearest_feasible
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.server import PageServer, chosen_by
+from sagline.viewer.readout import chosen_by
+from sagline.viewer.server import PageServer
 from sagline.viewer.snapshot import Settings, Snapshot, missing_of, snapshot_at
 from sagline.viewer.tension_scale import force_unit
 from tests.effort import best_rate

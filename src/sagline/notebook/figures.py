@@ -65,14 +65,14 @@ def figure_of(thing: object) -> Figure | None:
 def _(robot: Robot) -> Figure | None:
     if robot.test_box is None:
         return None
-    return _whole(draw_at_rest(robot, drawn_pose(robot, None), middle_plan(robot)))
+    return draw_at_rest(robot, drawn_pose(robot, None), middle_plan(robot)).get_figure(root=True)
 
 
 @figure_of.register
 def _(plan: Plan) -> Figure | None:
     state = plan.state
     if not state.pose.shape:
-        return _whole(draw_at_rest(state.one_robot, state.pose, plan))
+        return draw_at_rest(state.one_robot, state.pose, plan).get_figure(root=True)
     return _time_lines(*abscissa(plan), plan.chord_tension, TENSIONS["chord_tension"][0], ~plan.feasible)
 
 
@@ -98,7 +98,7 @@ def _(path: Path) -> Figure | None:
     ax.plot(x[:1], y[:1], "o", color=sheets.BLUE, markersize=5.0)
     sheets.format_axes(ax, *PLACE[:2])
     ax.set_aspect("equal", adjustable="datalim")
-    return _whole(ax)
+    return ax.get_figure(root=True)
 
 
 @figure_of.register
@@ -120,7 +120,7 @@ def _(space: Workspace) -> Figure | None:
     sheets.format_axes(ax, PLACE[first], PLACE[second])
     ax.set_aspect("equal")
     name_lines(ax)
-    return _whole(ax)
+    return ax.get_figure(root=True)
 
 
 @figure_of.register
@@ -156,11 +156,6 @@ def _chosen(values: Array) -> Indices:
     columns = known[:, np.isfinite(known).any(axis=0)]
     ends = [end(columns, axis=0) for end in (np.nanargmax, np.nanargmin)] if columns.size else []
     return np.unique(np.concatenate((even, *ends))).astype(np.int64)
-
-
-def _whole(ax: object) -> Figure | None:
-    figure = getattr(ax, "figure", None)
-    return figure if isinstance(figure, Figure) else None
 
 
 def _html(figure: Figure, description: str) -> str:

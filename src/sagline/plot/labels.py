@@ -77,17 +77,12 @@ def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
     return ceil(len(labels) / ceil(len(labels) / columns))
 
 
-def set_heading(target: FigureBase | Axes, text: str) -> None:
+def set_heading(target: FigureBase | Axes, text: str, size: float | None = None, **look: Any) -> None:
     """Add a heading without formulas to a figure or to axes, broken into lines to fit the width."""
-    size = current().label
-    add = target.suptitle if isinstance(target, FigureBase) else target.set_title
-    add(wrap_heading(text, size), fontsize=size, parse_math=False)  # names may contain dollar signs
-
-
-def wrap_heading(text: str, size: float) -> str:
-    """Heading with line breaks, so that it fits the figure width of the current style."""
-    look = current()
-    return fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
+    style, add = current(), target.suptitle if isinstance(target, FigureBase) else target.set_title
+    size = style.label if size is None else size
+    lines = fill(text, int(SHARE * style.width / POINT / (WIDE[style.font] * size)))
+    add(lines, fontsize=size, parse_math=False, **look)  # names may contain dollar signs
 
 
 def _is_line(handle: Artist) -> TypeGuard[Line2D]:

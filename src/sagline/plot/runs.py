@@ -17,7 +17,7 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import ROUNDING, n, prefixed_unit
 from sagline.dynamics.simulation.results import Simulation
 from sagline.plot import sheet
-from sagline.plot.labels import figure_legend, legend_above, name_lines, wrap_heading, write_beside
+from sagline.plot.labels import figure_legend, legend_above, name_lines, set_heading, write_beside
 from sagline.plot.style import current
 
 PER_METER: Final = 1e3  # [mm]
@@ -101,8 +101,8 @@ def energy(simulation: Simulation) -> Figure:
         low, high = ax.get_ylim()
         ax.set_ylim(min(low, -share * widest), max(high, share * widest))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
-    text = wrap_heading(f"kinetic + potential + lost - supplied, minus initial value: at most {worst}", current().tick)
-    below.set_title(text, fontsize=current().tick, loc="left")
+    text = f"kinetic + potential + lost - supplied, minus initial value: at most {worst}"
+    set_heading(below, text, current().tick, loc="left")
     return figure
 
 

@@ -19,7 +19,6 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.margin import cable_margins, capacity_margin
-from sagline.viewer.server import chosen_by
 from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, cables_text, force_unit, number_text
@@ -37,6 +36,11 @@ def html_block(content: str) -> str:
 def sentence(text: str) -> str:
     """HTML of a sentence."""
     return f'<div class="sagline quiet">{text}</div>'
+
+
+def chosen_by(topic: str, value: str | int) -> str:
+    """Attributes of an HTML element that sends a value under a topic when it is clicked; see browser/choices.js."""
+    return f'data-send="{topic}" data-value="{escape(str(value))}"'
 
 
 def verdict(snapshot: Snapshot) -> str:

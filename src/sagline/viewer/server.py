@@ -203,11 +203,6 @@ def _check(host: str, port: int) -> None:
         raise InvalidValueError(f"{host}:{port}", value, allowed, step) from None
 
 
-def chosen_by(topic: str, value: str | int) -> str:
-    """Attributes of an HTML element that sends a value under a topic when it is clicked; see browser/choices.js."""
-    return f'data-send="{topic}" data-value="{escape(str(value))}"'
-
-
 def typed(field: Any, longest: int = 40) -> str:
     """Text of a field without superfluous spaces, up to `longest` characters."""
     return " ".join(str(field.value).split())[:longest]

@@ -18,7 +18,6 @@ from sagline.kinematics.inverse_rows import Given
 from sagline.robot.robot import Robot, without_cables
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer.readout import color_key, html_block, table_html
-from sagline.viewer.robot_scene import NO_SHADOW, Nodes
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import ForceUnit, cable_color
 from sagline.workspaces.boundary import Outline, outline
@@ -43,13 +42,6 @@ class Patch(NamedTuple):
         """A patch of some faces of a mesh, with the corners of these faces only."""
         used, index = np.unique(faces, return_inverse=True)
         return cls(vertices[used], index.reshape(-1, 3), color)
-
-
-def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "double") -> None:
-    """Draw `patches` below `name`, instead of the previous patches."""
-    for k, patch in enumerate(patches):
-        nodes.mesh(f"{name}/{k}", *patch, side=side, **NO_SHADOW)
-    nodes.keep_first(name, len(patches))
 
 
 CELLS: Final = 30  # cells along each edge of a cube; another box has the same total number of cubic cells

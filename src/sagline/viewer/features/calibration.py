@@ -19,9 +19,9 @@ from sagline.core.numbers import counted, n
 from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import color_key, html_block, refused, sentence, table_html, verdict_box
+from sagline.viewer.readout import chosen_by, color_key, html_block, refused, sentence, table_html, verdict_box
 from sagline.viewer.robot_scene import INFEASIBLE, NO_SHADOW, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
-from sagline.viewer.server import chosen_by, toggle, typed
+from sagline.viewer.server import toggle, typed
 from sagline.viewer.shapes import ball, error_ellipsoids, placed_balls, readable
 
 FIELD: Final = "Row of the log"

@@ -18,8 +18,7 @@ from sagline.viewer.features.push import PushFeature
 from sagline.viewer.features.state import FIRST, StateFeature
 from sagline.viewer.page import Page
 from sagline.viewer.player import PlayerState
-from sagline.viewer.readout import html_block
-from sagline.viewer.server import chosen_by
+from sagline.viewer.readout import chosen_by, html_block
 from sagline.viewer.snapshot import ByHand
 
 PAUSE: Final = 0.4  # time without a change after which the inputs are recorded [s], so that a drag is one step

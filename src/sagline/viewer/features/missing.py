@@ -22,9 +22,8 @@ from sagline.viewer import shapes
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.tensions import SHARING
 from sagline.viewer.page import Page
-from sagline.viewer.readout import definitions, html_block
+from sagline.viewer.readout import chosen_by, definitions, html_block
 from sagline.viewer.robot_scene import INFEASIBLE, Nodes
-from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import MissingWrench, Snapshot, method_name
 from sagline.viewer.tension_scale import ForceUnit, cables_text, force_unit, number_text
 from sagline.viewer.workspace import CELLS, DIRECTIONS, WorkspaceQuery, free_directions

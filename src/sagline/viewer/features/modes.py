@@ -24,8 +24,8 @@ from sagline.dynamics.vibration.vibration import (
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import html_block, refused, sentence
-from sagline.viewer.server import chosen_by, toggle, typed
+from sagline.viewer.readout import chosen_by, html_block, refused, sentence
+from sagline.viewer.server import toggle, typed
 from sagline.viewer.swing import PERIOD, Swing, mode_of
 from sagline.viewer.tension_scale import number_text
 

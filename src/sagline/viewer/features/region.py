@@ -189,7 +189,7 @@ class RegionFeature(Feature):
     def _show_hull(self, patches: list[workspace.Patch], *, opened: bool = False) -> None:
         """Draw the hull. With `opened`, its front faces are not drawn."""
         with self._server.atomic():
-            workspace.draw_patches(self._nodes, "/hull", patches, "back" if opened else "double")
+            _draw_patches(self._nodes, "/hull", patches, "back" if opened else "double")
 
     def _follow_hull(self) -> None:
         """Draw the latest hull, and start the computation of a better one."""
@@ -253,7 +253,7 @@ class RegionFeature(Feature):
             what = "tension to its nearest limit" if is_underconstrained(self._levels.robot) else "force with moment"
             self._margin_html.content = html_block(f"<b>Margin here</b>, {what}: {text}")
         with self._server.atomic():
-            workspace.draw_patches(self._nodes, "/wall", patches)
+            _draw_patches(self._nodes, "/wall", patches)
             self._nodes.label("/platform/left", text, (0.0, 0.0, -_BELOW * self._size), "top-center", _TEXT_SCALE)
 
     def _follow_slice(self, levels: Levels, region: Region, pose: Pose) -> None:
@@ -304,6 +304,13 @@ class RegionFeature(Feature):
         self._nodes.hide("/platform/left")
         self._hull_key = self._key = self._slice_key = None
         self._result = _NO_RESULT
+
+
+def _draw_patches(nodes: Nodes, name: str, patches: list[workspace.Patch], side: str = "double") -> None:
+    """Draw `patches` below `name`, instead of the previous patches."""
+    for k, patch in enumerate(patches):
+        nodes.mesh(f"{name}/{k}", *patch, side=side, **NO_SHADOW)
+    nodes.keep_first(name, len(patches))
 
 
 def _scale_of(levels: Levels, region: Region) -> MarginScale:

@@ -17,8 +17,8 @@ from sagline.tension.polygon import Side, TensionPolygon
 from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import html_block, sentence
-from sagline.viewer.server import chosen_by, finite_numbers
+from sagline.viewer.readout import chosen_by, html_block, sentence
+from sagline.viewer.server import finite_numbers
 from sagline.viewer.snapshot import BY_HAND, METHODS, ByHand, MethodMark, MethodMarks, Snapshot, method_name
 from sagline.viewer.tension_scale import force_unit, number_text
 
