@@ -100,46 +100,6 @@ Show: TypeAlias = Callable[[View], None]  # draws a view
 Take: TypeAlias = Callable[..., None]  # makes the page take a picture, "png" or "jpeg", and waits for it
 
 
-@contextmanager
-def _offscreen_scene(
-    client: viser.ClientHandle,
-    server: viser.ViserServer,
-    shot: Shot,
-    view: View,
-    line_width: float,
-    played: Played | None = None,
-) -> Iterator[tuple[Show, Take]]:
-    """Context manager of a scene of one client, for pictures of the played motion or of the view."""
-
-    def show(view: View) -> None:
-        settings = view.settings
-        with client.atomic():
-            scene.place(view.snapshot.pose)
-            scene.show(view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
-
-    def take(kind: Literal["png", "jpeg"], height: int = shot.height, width: int = shot.width) -> None:
-        camera = _camera_of(client)
-        place = camera.place + shot.forward * camera.axes[:, 2]
-        looks: dict[str, Any] = {"wxyz": client.camera.wxyz, "position": place, "fov": shot.field}
-        client.get_render(height, width, transport_format=kind, timeout=PATIENCE, **looks)
-
-    snapshot = view.snapshot
-    robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.at(0.0).pose)
-    try:
-        scene = RobotScene(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
-        if played is not None:
-            scene.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))
-        drawn = set(client.scene._handle_from_node_name)  # viser has no public list of its nodes
-        for name in sorted(set(server.scene._handle_from_node_name) - drawn):
-            if name.startswith(NAMES) or (played is not None and not name.startswith(STATIC)):
-                client.scene.add_frame(name, show_axes=False, visible=False)
-        show(view)
-        take("jpeg", _FIRST, _FIRST)  # labels appear one picture late
-        yield show, take
-    finally:
-        client.scene.reset()
-
-
 WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # size of a film and of its text [px]
 RATE = 30.0  # pictures of a film per second
 LONGEST = 120.0  # longest film [s]; a longer one would fill the memory of a browser
@@ -278,7 +238,7 @@ class ExportFeature(Feature):
             "width": shot.width, "height": shot.height + beneath,
         }  # fmt: skip
         try:
-            with _offscreen_scene(client, self._server, shot, view, LINE * dots / 72.0) as (_, take):
+            with self._offscreen_scene(client, shot, view, LINE * dots / 72.0) as (_, take):
                 exporter.messages.send(PICTURE, about)
                 take("png")
         finally:
@@ -308,7 +268,7 @@ class ExportFeature(Feature):
         send(CLOCK, None)  # pictures without a clock do not belong to the film
         send(TOPIC, about)
         try:
-            with _offscreen_scene(client, self._server, shot, view, LINE_WIDTH, played) as (show, take):
+            with self._offscreen_scene(client, shot, view, LINE_WIDTH, played) as (show, take):
                 for time in times:
                     if exporter.cancelled.is_set():
                         return
@@ -318,6 +278,40 @@ class ExportFeature(Feature):
                     take("jpeg")
         finally:
             send(TOPIC, None)  # a page with all pictures completes the film
+
+    @contextmanager
+    def _offscreen_scene(
+        self, client: viser.ClientHandle, shot: Shot, view: View, line_width: float, played: Played | None = None
+    ) -> Iterator[tuple[Show, Take]]:
+        """Context manager of a scene of one client, for pictures of the played motion or of the view."""
+
+        def show(view: View) -> None:
+            settings = view.settings
+            with client.atomic():
+                scene.place(view.snapshot.pose)
+                scene.show(view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
+
+        def take(kind: Literal["png", "jpeg"], height: int = shot.height, width: int = shot.width) -> None:
+            camera = _camera_of(client)
+            place = camera.place + shot.forward * camera.axes[:, 2]
+            looks: dict[str, Any] = {"wxyz": client.camera.wxyz, "position": place, "fov": shot.field}
+            client.get_render(height, width, transport_format=kind, timeout=PATIENCE, **looks)
+
+        snapshot = view.snapshot
+        robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.at(0.0).pose)
+        try:
+            scene = RobotScene(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
+            if played is not None:
+                scene.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))
+            drawn = set(client.scene._handle_from_node_name)  # viser has no public list of its nodes
+            for name in sorted(set(self._server.scene._handle_from_node_name) - drawn):
+                if name.startswith(NAMES) or (played is not None and not name.startswith(STATIC)):
+                    client.scene.add_frame(name, show_axes=False, visible=False)
+            show(view)
+            take("jpeg", _FIRST, _FIRST)  # labels appear one picture late
+            yield show, take
+        finally:
+            client.scene.reset()
 
     def _cancel(self, _: Any, client: int) -> None:
         if client in self._exporters:
