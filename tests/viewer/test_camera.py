@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import shapes
-from sagline.viewer.camera import Camera, nearest_line, ray_distance
+from sagline.viewer.camera import Camera
 
 CAMERA = SimpleNamespace(  # ten meters before the origin, looking along y
     wxyz=np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]),
@@ -66,7 +66,7 @@ def test_the_intersection_of_ray_and_platform_agrees_with_single_triangles(name:
         direction = (
             body.vertices.mean(axis=0) + random.uniform(-0.6, 0.6, size=3) * np.ptp(body.vertices, axis=0) - start
         )
-        far = ray_distance(body, start, direction)
+        far = body.ray_distance(start, direction)
         fars = []
         for a, b, c in body.vertices[body.faces]:
             matrix = np.column_stack((b - a, c - a, -direction))
@@ -85,9 +85,9 @@ def test_the_nearest_line_is_chosen_and_at_a_crossing_the_front_one() -> None:
     upright = np.array([[1.0, 2.0, -3.0], [1.0, 2.0, 3.0]])  # behind it
     lines = np.stack((across, upright))
     # z = 1 at 10 m is 60 px above the middle; x = 1 at 12 m is 50 px to the right
-    assert nearest_line(eye(), (300.0 / 800.0, 245.0 / 600.0), lines, 8.0) == 0
-    assert nearest_line(eye(), (452.0 / 800.0, 300.0 / 600.0), lines, 8.0) == 1
-    assert nearest_line(eye(), (450.0 / 800.0, 240.0 / 600.0), lines, 8.0) == 0
-    assert nearest_line(eye(), (300.0 / 800.0, 290.0 / 600.0), lines, 8.0) is None
+    assert eye().nearest_line((300.0 / 800.0, 245.0 / 600.0), lines, 8.0) == 0
+    assert eye().nearest_line((452.0 / 800.0, 300.0 / 600.0), lines, 8.0) == 1
+    assert eye().nearest_line((450.0 / 800.0, 240.0 / 600.0), lines, 8.0) == 0
+    assert eye().nearest_line((300.0 / 800.0, 290.0 / 600.0), lines, 8.0) is None
     behind = lines - np.array([0.0, 20.0, 0.0])
-    assert nearest_line(eye(), (300.0 / 800.0, 240.0 / 600.0), behind, 1e9) is None
+    assert eye().nearest_line((300.0 / 800.0, 240.0 / 600.0), behind, 1e9) is None

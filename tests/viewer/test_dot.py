@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 import sagline as sl
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
-from sagline.viewer.features.tensions import DotField, dot_field_of, grouped, polygon_figure
+from sagline.viewer.features.tensions import DotField, grouped, polygon_figure
 from sagline.viewer.page import Page, Source, home_pose
 from sagline.viewer.snapshot import BY_HAND, METHODS, ByHand, MethodMarks, Settings, Snapshot, snapshot_at
 from tests.effort import best_rate
@@ -77,7 +77,7 @@ def nearest_by_program(polygon: sl.TensionPolygon, low: Any, high: Any, at: np.n
 @pytest.mark.parametrize("name", ["cogiro", "falcon-7", "ipanema-1"])
 def test_the_dot_stays_at_the_nearest_feasible_point(name: str) -> None:
     robot, generator = sl.load_robot(name), np.random.default_rng(3)
-    field = dot_field_of(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
+    field = DotField.of(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
     assert field is not None
     polygon = field.polygon
     for _ in range(10):
@@ -93,7 +93,7 @@ def test_the_dot_stays_at_the_nearest_feasible_point(name: str) -> None:
 def test_an_unbounded_polygon_is_drawn_up_to_the_known_points() -> None:
     robot = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
     snapshot = snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None)
-    field = dot_field_of(snapshot)
+    field = DotField.of(snapshot)
     assert field is not None
     assert None in field.sides
     assert np.ptp(field.corners, axis=0).max() < 5e3  # not the 1e5 N that represent infinity
@@ -104,7 +104,7 @@ def test_an_unbounded_polygon_is_drawn_up_to_the_known_points() -> None:
         if side is not None:
             assert at_limit[side.cable]
     one = sl.load_robot("falcon-7").replace(tension_max=np.inf)
-    line = dot_field_of(snapshot_at(one, home_pose(one), Settings(mass=one.mass), None))
+    line = DotField.of(snapshot_at(one, home_pose(one), Settings(mass=one.mass), None))
     assert line is not None
     assert np.isfinite(line.corners).all()
 
@@ -113,7 +113,7 @@ def test_an_unbounded_polygon_is_drawn_up_to_the_known_points() -> None:
 def test_chosen_tensions_are_feasible_with_heavy_cables(page: Shown) -> None:
     generator = np.random.default_rng(4)
     with Client(page.url) as client:
-        field = dot_field_of(seen(page))
+        field = DotField.of(seen(page))
         assert field is not None
         pulls = []
         for _ in range(12):
@@ -130,7 +130,7 @@ def test_chosen_tensions_are_feasible_with_heavy_cables(page: Shown) -> None:
             assert moment < 1e-7 * scale
             assert np.all(snapshot.tension >= HEAVY.tension_min - 1e-9 * scale)
             assert np.all(snapshot.tension <= HEAVY.tension_max + 1e-9 * scale)
-            drawn = dot_field_of(snapshot)
+            drawn = DotField.of(snapshot)
             assert drawn is not None
             assert drawn.polygon.coordinates(snapshot.tension) == pytest.approx(drawn.nearest(at), abs=1e-2 * scale)
             pulls.append(plan.state.pull)
@@ -151,7 +151,7 @@ def test_copied_code_gives_the_chosen_tensions(page: Shown) -> None:
 
 def test_steps_add_up_and_stop_at_the_limits() -> None:
     with contextmanager(shown)(lambda server: Page(server, FEATURES, HEAVY)) as page, Client(page.url) as client:
-        field = dot_field_of(seen(page))  # as large as the first at a pose are the steps there
+        field = DotField.of(seen(page))  # as large as the first at a pose are the steps there
         assert field is not None
         start = moved(page, client, {"at": [0.0, 0.0]})
         for _ in range(5):
@@ -169,7 +169,7 @@ def test_steps_add_up_and_stop_at_the_limits() -> None:
 def test_one_redundant_cable_has_one_coordinate() -> None:
     robot = sl.load_robot("falcon-7")
     with contextmanager(shown)(lambda server: Page(server, FEATURES, robot)) as page, Client(page.url) as client:
-        field = dot_field_of(seen(page))
+        field = DotField.of(seen(page))
         assert field is not None
         size = float(np.max(field.high - field.low))
         start = moved(page, client, {"at": [float(field.polygon.vertices.mean())]})
@@ -187,7 +187,7 @@ def test_a_drag_keeps_the_nearest_tensions_to_the_chosen_ones(page: Shown) -> No
             snapshot = seen(page)
             assert snapshot.plan is not None
             assert snapshot.plan.feasible
-            field = dot_field_of(snapshot)
+            field = DotField.of(snapshot)
             assert field is not None
             wanted = field.polygon.basis @ chosen
             expected = nearest_by_program(field.polygon, HEAVY.tension_min, HEAVY.tension_max, wanted)
@@ -234,7 +234,7 @@ def test_marks_are_at_the_results_of_their_methods() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
-    field, found = dot_field_of(snapshot), MethodMarks()
+    field, found = DotField.of(snapshot), MethodMarks()
     assert field is not None
     assert snapshot.plan is not None
     marks = found.at(snapshot.plan)
@@ -297,16 +297,16 @@ def test_methods_without_a_result_are_listed() -> None:
     marks = MethodMarks().at(snapshot.plan)
     missing = {mark.name: mark.missing for mark in marks if mark.missing}
     assert "ClosedForm" in missing
-    html = polygon_figure(snapshot, marks, dot_field_of(snapshot))
+    html = polygon_figure(snapshot, marks, DotField.of(snapshot))
     assert re.search(r"ClosedForm: none", html)
 
 
 def test_the_polygon_does_not_move_with_the_dot() -> None:
     settings = Settings(mass=HEAVY.mass)
-    first = dot_field_of(snapshot_at(HEAVY, home_pose(HEAVY), settings, None))
+    first = DotField.of(snapshot_at(HEAVY, home_pose(HEAVY), settings, None))
     assert isinstance(first, DotField)
     hand = ByHand(target=first.tension(first.corners[0]))
-    second = dot_field_of(snapshot_at(HEAVY, home_pose(HEAVY), Settings(mass=HEAVY.mass, tension=hand), None), first)
+    second = DotField.of(snapshot_at(HEAVY, home_pose(HEAVY), Settings(mass=HEAVY.mass, tension=hand), None), first)
     assert second is not None
     assert second.scale == first.scale
     np.testing.assert_array_equal(second.middle, first.middle)

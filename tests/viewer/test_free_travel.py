@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sagline.viewer.tension_scale import ForceUnit
-from sagline.viewer.workspace import NAMES, free_travel, travel_text
+from sagline.viewer.workspace import NAMES, free_travel
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
 
 LOW, HIGH = np.full(3, -2.0), np.full(3, 2.0)
@@ -29,7 +29,7 @@ def test_travel_ends_at_the_boundary_or_at_the_box() -> None:
 
 def test_the_nearest_end_is_printed_first() -> None:
     found = free_travel(ball, np.array([0.2, -0.3, 0.4]), ALL, LOW, HIGH)
-    html = travel_text(found, NEWTON)
+    html = found.text(NEWTON)
     nearest = NAMES[int(found.distance.argmin())]
     assert re.search(rf"Boundary</b> {found.distance.min():.3f} m [a-z]+ {re.escape(nearest)}, cable 3", html)
     assert "<b>Margin</b> 96.1 N" in html
@@ -41,7 +41,7 @@ def test_travel_from_outside_leads_back() -> None:
     assert not found.inside
     assert found.crossed.tolist() == [True, False, False, False, False, False]
     assert found.distance[0] == pytest.approx(1.9 - np.sqrt(RADIUS**2 - 0.01), abs=1e-4)
-    html = travel_text(found, NEWTON)
+    html = found.text(NEWTON)
     assert "Workspace" in html
     assert "workspace, cable 5" in html
 
@@ -55,5 +55,5 @@ def test_a_platform_outside_of_the_box_finds_back_along_an_axis() -> None:
     found = free_travel(ball, np.array([0.0, 0.0, 5.0]), ALL, LOW, HIGH)
     assert found.crossed.tolist() == [False] * 5 + [True]
     assert found.distance[5] == pytest.approx(5.0 - RADIUS, abs=1e-3)
-    assert "3.500 m along −z" in travel_text(found, NEWTON)
-    assert "No boundary" in travel_text(free_travel(ball, np.array([3.0, 3.0, 5.0]), ALL, LOW, HIGH), NEWTON)
+    assert "3.500 m along −z" in found.text(NEWTON)
+    assert "No boundary" in free_travel(ball, np.array([3.0, 3.0, 5.0]), ALL, LOW, HIGH).text(NEWTON)

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 import sagline as sl
 from sagline import structure_matrix
 from sagline.viewer.features import push
-from sagline.viewer.features.push import Push, push_response, semi_axes
+from sagline.viewer.features.push import Push, PushResponse, semi_axes
 from sagline.viewer.page import home_pose
 from tests.refusal import refused
 from tests.tiers import wide
@@ -45,7 +45,7 @@ def end_forces(state: sl.Equilibrium) -> np.ndarray:
 def test_the_displaced_platform_is_in_balance_with_fixed_lengths(name: str) -> None:
     state = rest(name)
     robot, push = state.one_robot, push_of(state)
-    found = push_response(state, push)
+    found = PushResponse.of(state, push)
     assert found.loaded is not None
     np.testing.assert_allclose(found.loaded.unstrained_length, state.unstrained_length, rtol=1e-9)
     center = found.loaded.pose.transform(robot.center_of_mass)
@@ -65,7 +65,7 @@ def test_the_displaced_platform_is_in_balance_with_fixed_lengths(name: str) -> N
 def test_the_compliance_agrees_with_differences_of_forward(name: str) -> None:
     state = rest(name)
     robot, at = state.one_robot, push_of(state).at
-    found = push_response(state, push_of(state))
+    found = PushResponse.of(state, push_of(state))
     small = 1e-4 * float(np.median(state.limited_tension))
     columns = []
     for axis in np.eye(3):
@@ -91,7 +91,7 @@ def test_the_compliance_agrees_with_differences_of_forward(name: str) -> None:
 def test_the_reserve_with_fixed_lengths_agrees_with_forward(name: str) -> None:
     state = rest(name)
     robot, push = state.one_robot, push_of(state)
-    held = push_response(state, push).reserve
+    held = PushResponse.of(state, push).reserve
     assert held.cable is not None
     assert 0.0 < held.force < np.inf
 
@@ -113,7 +113,7 @@ def test_the_reserve_with_fixed_lengths_agrees_with_forward(name: str) -> None:
 def test_the_reserve_with_redistribution_agrees_with_a_linear_program(name: str) -> None:
     state = rest(name, sl.Elastic())  # weightless: then tensions balance a load linearly
     robot, push = state.one_robot, push_of(state)
-    shared = push_response(state, push).redistributed
+    shared = PushResponse.of(state, push).redistributed
     along = push.force / np.linalg.norm(push.force)
     lever = state.pose.matrix @ (push.at - robot.center_of_mass)
     load = np.hstack((along, np.cross(lever, along)))
@@ -140,16 +140,16 @@ def test_a_cable_at_its_limit_leaves_no_reserve_against_it() -> None:
     assert state.limited_tension[at_limit] == pytest.approx(robot.tension_min[at_limit], rel=1e-9)
     towards = robot.frame_anchors[at_limit] - state.pose.transform(robot.platform_anchors[at_limit])
     force = 5.0 * towards / np.linalg.norm(towards)
-    found = push_response(state, Push(force, robot.platform_anchors[at_limit]))
+    found = PushResponse.of(state, Push(force, robot.platform_anchors[at_limit]))
     assert found.reserve.force < 1e-3  # N
     assert (found.reserve.cable, found.reserve.upper) == (at_limit, False)
-    away = push_response(state, Push(-force, robot.platform_anchors[at_limit]))
+    away = PushResponse.of(state, Push(-force, robot.platform_anchors[at_limit]))
     assert away.reserve.cable != at_limit or away.reserve.force > 0.0
 
 
 def test_the_displacement_is_magnified_and_the_factor_stated() -> None:
     state = rest("cogiro")
-    found = push_response(state, push_of(state))
+    found = PushResponse.of(state, push_of(state))
     assert found.loaded is not None
     once, often = found.scaled_pose(1.0), found.scaled_pose(20.0)
     assert once is not None
@@ -166,12 +166,12 @@ def test_the_displacement_is_magnified_and_the_factor_stated() -> None:
 
 def test_straight_cables_have_no_displacement() -> None:
     with refused("push: cable model", "straight", "one that stretches", kind=sl.InvalidValueError):
-        push_response(rest("cogiro", sl.Straight()), push_of(rest("cogiro")))
+        PushResponse.of(rest("cogiro", sl.Straight()), push_of(rest("cogiro")))
 
 
 def test_an_unconstrained_motion_is_reported() -> None:
     state = rest("cogiro")
-    found = replace(push_response(state, push_of(state)), compliance=np.full((3, 3), np.nan), loaded=None)
+    found = replace(PushResponse.of(state, push_of(state)), compliance=np.full((3, 3), np.nan), loaded=None)
     told = push.response_text(found, None)
     assert "no equilibrium" in told
     assert "no cable" in told

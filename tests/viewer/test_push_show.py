@@ -12,7 +12,7 @@ import sagline as sl
 from sagline.viewer import shapes
 from sagline.viewer.camera import Camera
 from sagline.viewer.features import FEATURES
-from sagline.viewer.features.push import FAR, Push, PushFeature, PushResponse, push_response
+from sagline.viewer.features.push import FAR, Push, PushFeature, PushResponse
 from sagline.viewer.page import Page
 from sagline.viewer.server import NAME
 from tests.tiers import extended, wide
@@ -142,7 +142,7 @@ def test_a_force_can_be_typed(page: Shown) -> None:
         assert found is not None
         told = page.text
         assert "25.0 N" in told
-        again = push_response(found.state, found.push)
+        again = PushResponse.of(found.state, found.push)
         np.testing.assert_array_equal(again.displacement, found.displacement)
         client.set(handle(page, "Along x, y, z"), [0.0, 0.0, 0.0])
         await_that(lambda: "Not possible" in page.text and push_of(page) is None)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sagline.viewer.tension_scale import ForceUnit, cable_color
-from sagline.viewer.workspace import Hull, margin_text, near_patches
+from sagline.viewer.workspace import Hull, margin_text
 
 SIDE = 41  # corners along each edge of a wall
 
@@ -30,14 +30,14 @@ def area(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 
 def test_no_side_is_highlighted_from_far_away() -> None:
-    assert near_patches(wall(), np.array([-0.1, 0.0, 0.0]), 1.0) == []
-    assert near_patches(wall(on_box=True), np.array([0.9, 0.0, 0.0]), 1.0) == []  # where the box ends there is no wall
+    assert wall().near_patches(np.array([-0.1, 0.0, 0.0]), 1.0) == []
+    assert wall(on_box=True).near_patches(np.array([0.9, 0.0, 0.0]), 1.0) == []  # where the box ends there is no wall
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.3, -0.5])
 def test_near_sides_are_brighter(distance: float) -> None:
     place = np.array([1.0 - distance, 0.5, 0.0])
-    found = near_patches(wall(), place, 1.0)
+    found = wall().near_patches(place, 1.0)
     assert {patch.color for patch in found} == {cable_color(2), cable_color(5)}
     whole = sum(area(patch.vertices, patch.faces) for patch in found)
     assert whole == pytest.approx(2.0 * np.pi * (1.0 - distance**2), rel=0.03)  # all within 1 m, on both sides

@@ -12,7 +12,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import FigureMaker, Output, TextTable, number_text, show_table
+from sagline.cli.output import FigureMaker, Output, TextTable, number_text
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.cli.track import ConfirmedRun, run_name, tell
 from sagline.core.errors import nearest
@@ -204,6 +204,6 @@ def _tell(result: Experiment) -> None:
     texts = [number_text(each, ".1f") for each in theirs], [number_text(each, ".3f") for each in ours]
     rows = [list(row) for row in zip((*map(str, table.points), "mean"), (*places, ""), *texts, strict=True)]
     verdict = f"Mean distance of the points {n(ours[-1], '.3f', 'mm')}; {n(theirs[-1], '.1f', 'mm')} in the article."
-    show_table(TextTable(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows), verdict)
+    TextTable(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows).show(verdict)
     took = n(result.duration / 60.0, ".1f", "min")
     show_text(f"It took {took}; the fastest winch had {n(1e3 * result.winch_speed, '.0f', 'mm/s')}.")

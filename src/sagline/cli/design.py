@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.output import Output, TextTable, number_text
 from sagline.cli.terminal import show_note, working
 from sagline.files.writing import create_folder
 
@@ -65,7 +65,7 @@ def design(
         output.files = front.save(files.folder)
         line.stage("drawing")
         output.draw(lambda: sl.plot.front(front))
-    output.report(lambda: _record(front), front.text, lambda: show_table(_table(front)))
+    output.report(lambda: _record(front), front.text, lambda: _table(front).show())
 
 
 def _table(front: sl.Front) -> TextTable:

@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
+from sagline.cli.output import Output, TextTable, number_text, values_of
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.numbers import n
 
@@ -71,7 +71,7 @@ def identify(
     verdict = f"chi-squared per degree of freedom: {number_text(cable.chi_squared, '.3g')}"
     title = f"{len(data.span)} measurements"
     grid = TextTable(["", "value", "standard error", "unit"], texts, title, left=frozenset({0, 3}))
-    show_table(grid, f"{verdict} (about 1 if the standard errors are right)")
+    grid.show(f"{verdict} (about 1 if the standard errors are right)")
     show_text(
         f"The empirical model with k_h, k_p has position errors below {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
         f"measured range if T_x is above {n(model.tension_min(TOLERANCE), '.3g', 'N')}."

@@ -11,7 +11,7 @@ import numpy as np
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Output, TextTable, file_of, number_text, show_table, write_or_show
+from sagline.cli.output import Output, TextTable, file_of, number_text, write_or_show
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.arrays import Array
 from sagline.files.writing import file_stem
@@ -155,7 +155,7 @@ def forward(
     else:
         count = len(rows) - 1
         many = f"All {count:,}" if not lost else f"{count - len(lost):,} of {count:,}"
-        show_table(_grid(rows), f"{many} samples have a pose in stable equilibrium.")
+        _grid(rows).show(f"{many} samples have a pose in stable equilibrium.")
         if count > SHOWN:
             show_text(f"The first {SHOWN} of {count:,} samples; the CSV file has all of them.")
         output.show()

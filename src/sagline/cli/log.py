@@ -10,7 +10,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import Output, TextTable, show_table
+from sagline.cli.output import Output, TextTable
 from sagline.cli.terminal import show_json, show_text, working
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -74,17 +74,17 @@ def _tell(done: sl.control.Execution) -> None:
     silent = int(np.count_nonzero(~done.answered))
     show_text(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} without a response.")
     show_text(f"{done.status.name}: {done.reason or done.status.text}")
-    show_table(TextTable(["state", "time [s]", "cycles"], _states(done)))
+    TextTable(["state", "time [s]", "cycles"], _states(done)).show()
     largest = [
         [name, n(value, ".3g", unit), "–" if cable is None else str(cable), f"{time:.2f}"]
         for name, value, unit, time, cable in _extremes(done)
     ]
-    show_table(TextTable(["largest", "value", "cable", "at [s]"], largest))
-    show_table(TextTable(["cycles by their delay", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
+    TextTable(["largest", "value", "cable", "at [s]"], largest).show()
+    TextTable(["cycles by their delay", "cycles", ""], _histogram(done), left=frozenset({0, 2})).show()
     if done.events:
         events = done.events[:MOST_EVENTS]
         rows = [[f"{_since(done, each.time):.2f}", f"{each.kind} {each.name}", each.text] for each in events]
-        show_table(TextTable(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
+        TextTable(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})).show()
     if len(done.events) > MOST_EVENTS:
         show_text(f"… and {len(done.events) - MOST_EVENTS:,} more events: --to FILE.nc has all of them.")
 

@@ -42,6 +42,12 @@ class TextTable:
     # indices of the columns whose cells may be broken into several lines
     prose: frozenset[int] = field(default=frozenset())
 
+    def show(self, verdict: str = "") -> None:
+        """Print `verdict`, and the table below."""
+        if verdict:
+            show_text(verdict, style="bold")
+        show_pieces(self.pieces)
+
     def pieces(self, console: Console, width: int) -> list[tuple[RichTable, int]]:
         """The smallest number of pieces that fit into `width`, with about equal numbers of columns."""
         full = self._filled(console, width)
@@ -85,13 +91,6 @@ class TextTable:
         for row in self.rows:
             table.add_row(*(Text(printable(row[k], "\n")) for k in columns))
         return table
-
-
-def show_table(grid: TextTable, verdict: str = "") -> None:
-    """Print `verdict`, and `grid` below."""
-    if verdict:
-        show_text(verdict, style="bold")
-    show_pieces(grid.pieces)
 
 
 def _least(console: Console, table: RichTable) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import Output, TextTable, show_table, values_of
+from sagline.cli.output import Output, TextTable, values_of
 from sagline.cli.terminal import show_json, show_text
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -53,7 +53,7 @@ def robots(files: opt.TableFiles = opt.TableFiles()) -> None:
         for robot in robots
         for frame, platform in [(_frame(robot), _platform(robot))]
     ]
-    show_table(TextTable(heads, rows, left=frozenset({0, 2, 4, 5})), f"{len(robots)} preset robots.")
+    TextTable(heads, rows, left=frozenset({0, 2, 4, 5})).show(f"{len(robots)} preset robots.")
     frame = "length × width × height above the floor. If the source gives no size: the box around the anchors."
     show_text(f"Frame: {frame}")
     show_text("")
@@ -80,16 +80,16 @@ def show(name: str = opt.ROBOT, files: opt.TableFiles = opt.TableFiles()) -> Non
         return
     assumed = f"; {len(robot.assumed)} values are assumed" if robot.assumed else ""
     values = _listing({field: record[field] for field in WHOLE}, _text, robot.name)
-    show_table(values, f"{robot.name}: {robot.cable_count} cables, {n(robot.mass, '.4g', 'kg')}{assumed}.")
+    values.show(f"{robot.name}: {robot.cable_count} cables, {n(robot.mass, '.4g', 'kg')}{assumed}.")
     if (winches := record["winches"]) is not None:
-        show_table(_listing(winches["value"], _winch_text, _marked("winches", winches)))
-    show_table(_anchors(record))
+        _listing(winches["value"], _winch_text, _marked("winches", winches)).show()
+    _anchors(record).show()
     if record["tolerances"]:
-        show_table(_listing(record["tolerances"], _deviation_text, "", "tolerance"))
+        _listing(record["tolerances"], _deviation_text, "", "tolerance").show()
     if (known := robot.calibration) is not None:
         source, note = (f" from {known.log}" * bool(known.log), f": {known.note}" * bool(known.note))
         show_text(f"Calibrated on {known.date}{source}{note}")
-        show_table(_listing(record["calibration"]["standard_error"], _deviation_text, "", "standard error"))
+        _listing(record["calibration"]["standard_error"], _deviation_text, "", "standard error").show()
     for label, text in (("Source", robot.source), ("Notes", robot.notes)):
         if text:
             show_text(f"{label}:")

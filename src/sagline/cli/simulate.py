@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import sagline as sl
 from sagline.cli import options as opt
-from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
+from sagline.cli.output import Output, TextTable, number_text, values_of
 from sagline.cli.tension import reason
 from sagline.cli.terminal import ProgressLine, show_note, show_text, working
 from sagline.cli.track import anchors_of, load_path_near
@@ -162,7 +162,7 @@ def _verdict(simulation: sl.Simulation, summary: Summary) -> str:
 
 def _tell(simulation: sl.Simulation, summary: Summary) -> None:
     rows = [[row.label, row.text] for row in summary.rows if row.text]
-    show_table(TextTable(["", simulation.robot.name], rows, left=frozenset({0, 1})))
+    TextTable(["", simulation.robot.name], rows, left=frozenset({0, 1})).show()
     for event in simulation.events:
         before, after = (number_text(value, ",.1f") for value in (event.tension_before, event.tension_after))
         show_text(f"{event.time:.3f} s: {event.text}, {before} N before, then at most {after} N")

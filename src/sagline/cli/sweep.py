@@ -10,7 +10,7 @@ from shlex import quote
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
+from sagline.cli.output import Output, TextTable, number_text, values_of
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.numbers import counted
 from sagline.files.writing import create_folder
@@ -102,7 +102,7 @@ def _show(found: sl.sweep.Sweep) -> None:
         if count
     ]
     verdict = f"{counts['feasible']:,} of {total:,} requests are feasible."
-    show_table(TextTable(["requests", "number", "[%]", ""], rows, str(found.request)), verdict)
+    TextTable(["requests", "number", "[%]", ""], rows, str(found.request)).show(verdict)
     show_text(f"{counted(found.tasks, 'task')}, {found.seconds:,.1f} s of work; variables: {', '.join(found.names)}")
     show_text(f"In {found.folder.resolve()}: read with sl.sweep.load({str(found.folder)!r})", whole=True)
 

@@ -9,7 +9,7 @@ import numpy as np
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Output, TextTable, show_table
+from sagline.cli.output import Output, TextTable
 from sagline.cli.terminal import show_note, show_text
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -67,7 +67,7 @@ def tension(
     tensions = {title: _record(plan) for title, plan in plans.items()}
 
     def tell() -> None:
-        show_table(_grid(robot, plans))
+        _grid(robot, plans).show()
         if margin is not None:
             what = "The cables can balance this additional force in any direction"
             show_text(f"Capacity margin: {n(margin, unit='N')}. {what}.")

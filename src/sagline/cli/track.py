@@ -14,7 +14,7 @@ import numpy as np
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import FigureMaker, Output, TextTable, show_table, values_of
+from sagline.cli.output import FigureMaker, Output, TextTable, values_of
 from sagline.cli.terminal import ProgressLine, show_note, show_text, working
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -211,7 +211,7 @@ def tell(runs: Sequence[ConfirmedRun], output: Output, notes: Sequence[str] = ()
     """Print the summary, `notes`, and the infeasible parts of the paths. Returns the exit code."""
 
     def show() -> None:
-        show_table(_summary_grid(runs))
+        _summary_grid(runs).show()
         for note in notes:
             show_text(note)
 

@@ -12,7 +12,7 @@ import numpy as np
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.output import Output, TextTable, number_text
 from sagline.cli.tension import reason
 from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.numbers import counted
@@ -168,7 +168,7 @@ def _tell(found: sl.Vibration, modes: list[ListedMode], state: sl.Equilibrium) -
         for mode in chosen
     ]
     x, y, z = state.pose.position
-    show_table(TextTable(HEADS, rows, f"{state.one_robot.name} at {x:g}, {y:g}, {z:g} m", left=frozenset()))
+    TextTable(HEADS, rows, f"{state.one_robot.name} at {x:g}, {y:g}, {z:g} m", left=frozenset()).show()
     if hidden := len(swinging) - len(chosen):
         show_text(f"Not shown: {hidden} modes of the cables alone (platform below {100.0 * LEAST_SHARE:.0f} %).")
     if beyond:
@@ -233,7 +233,7 @@ def _tell_map(found: sl.FrequencyMap) -> None:
             [label, *(text for k in (first, last) for text in (number_text(values[k], form), _place(found, k)))]
         )
     heads = ["", "minimum", "at x, y, z [m]", "maximum", "at x, y, z [m]"]
-    show_table(TextTable(heads, rows, found.robot.name))
+    TextTable(heads, rows, found.robot.name).show()
 
 
 def _place(found: sl.FrequencyMap, k: int) -> str:

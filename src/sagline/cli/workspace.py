@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import sagline as sl
 from sagline.cli import options as opt
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Output, TextTable, number_text, show_table, values_of
+from sagline.cli.output import Output, TextTable, number_text, values_of
 from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.numbers import counted
 from sagline.files.writing import file_stem
@@ -172,14 +172,14 @@ def _tell(space: sl.Workspace, proof: sl.Proof | None) -> None:
 
     facts = [("area" if space.unit == "m²" else "volume", amount_of(space))]
     facts += [(head, text) for head, text in facts_of(space) if head != "nearest"]
-    show_table(TextTable(["robot", space.robot.name], facts, left=frozenset({0, 1}), prose=frozenset({1})))
+    TextTable(["robot", space.robot.name], facts, left=frozenset({0, 1}), prose=frozenset({1})).show()
     if limits := space.limits:
-        show_table(_limits(limits))
+        _limits(limits).show()
     if proof is not None:
         spans = span_of(proof.box)
         shares = {"proved inside": proof.inside, "proved outside": proof.outside, "open": proof.open}
         rows = [[word, number_text(100.0 * part, ".2f"), f"{part * proof.volume:.4g}"] for word, part in shares.items()]
-        show_table(TextTable([f"{spans} m", "share [%]", "volume [m³]"], rows))
+        TextTable([f"{spans} m", "share [%]", "volume [m³]"], rows).show()
         show_text(f"{proof.verdict.name}: {proof.verdict.text}.")
 
 

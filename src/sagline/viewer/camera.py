@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
-from sagline.viewer.shapes import Solid, box_corners
+from sagline.viewer.shapes import box_corners
 
 OUTSIDE: Final = 10.0  # largest coordinate of a point of a picture; (0, 0) is its upper left, (1, 1) its lower right
 
@@ -40,6 +40,12 @@ class Camera(NamedTuple):
         axes = Rotation.from_quat(np.roll(turn, -1)).as_matrix()
         return cls(place, axes, high * np.array([pixels[0] / pixels[1], 1.0]), pixels)
 
+    @classmethod
+    def of_client(cls, server: viser.ViserServer, client: int) -> Camera | None:
+        """Camera of a client by its number; None if it is unknown."""
+        found = server.get_clients().get(client)
+        return None if found is None else cls.of(found.camera)
+
     def ray(self, at: ArrayLike) -> Array:
         """Direction to a point of the picture, at a depth of 1, shape (3,)."""
         across, down = self.reach * (2.0 * np.asarray(at) - 1.0)
@@ -57,48 +63,22 @@ class Camera(NamedTuple):
         flat = np.stack((across / ahead, down / ahead), axis=-1) / self.reach
         return np.asarray(0.5 * (flat + 1.0) * self.pixels), deep
 
-
-def camera_of(server: viser.ViserServer, client: int) -> Camera | None:
-    """Camera of a client by its number; None if it is unknown."""
-    found = server.get_clients().get(client)
-    return None if found is None else Camera.of(found.camera)
-
-
-def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
-    """Distance along a ray to the surface `solid`, in lengths of `direction`; None without an intersection.
-
-    Source:
-        Moeller & Trumbore, J. Graphics Tools 2, 1997.
-    """
-    first, second, third = np.moveaxis(solid.vertices[solid.faces], 1, 0)
-    one, two, gap = second - first, third - first, start - first
-    across = np.cross(direction, two)
-    volume = np.einsum("fi,fi->f", one, across)
-    flat = np.abs(volume) <= 1e-14 * np.abs(one).max() * np.abs(two).max() * np.abs(direction).max()
-    volume = np.where(flat, np.nan, volume)
-    other = np.cross(gap, one)
-    u, v = np.einsum("fi,fi->f", gap, across) / volume, other @ direction / volume
-    far = np.einsum("fi,fi->f", two, other) / volume
-    hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (far > 0.0)
-    return float(far[hit].min()) if hit.any() else None
-
-
-def nearest_line(camera: Camera, at: ArrayLike, lines: Array, within: float) -> int | None:
-    """Of all `lines` within `within` [px] of the picture point `at`, the line nearest to the viewer; or None."""
-    places, deep = camera.project(lines)
-    pixel = np.asarray(at) * camera.pixels
-    start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
-    length = np.maximum(np.einsum("mpi,mpi->mp", run, run), 1e-12)
-    share = np.clip(-np.einsum("mpi,mpi->mp", start, run) / length, 0.0, 1.0)
-    away = np.linalg.norm(start + share[..., None] * run, axis=-1)
-    ahead = (deep[:, :-1] > 0.0) & (deep[:, 1:] > 0.0)
-    away = np.where(ahead & np.isfinite(away), away, np.inf)
-    nearest = away.min(axis=1)
-    if not nearest.min() <= within:
-        return None
-    depth = np.take_along_axis(deep, away.argmin(axis=1)[:, None], axis=1)[:, 0]
-    as_near = nearest <= nearest.min() + 1.0  # [px], includes cables that cross there
-    return int(np.argmin(np.where(as_near, depth, np.inf)))
+    def nearest_line(self, at: ArrayLike, lines: Array, within: float) -> int | None:
+        """Of all `lines` within `within` [px] of the picture point `at`, the line nearest to the viewer; or None."""
+        places, deep = self.project(lines)
+        pixel = np.asarray(at) * self.pixels
+        start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
+        length = np.maximum(np.einsum("mpi,mpi->mp", run, run), 1e-12)
+        share = np.clip(-np.einsum("mpi,mpi->mp", start, run) / length, 0.0, 1.0)
+        away = np.linalg.norm(start + share[..., None] * run, axis=-1)
+        ahead = (deep[:, :-1] > 0.0) & (deep[:, 1:] > 0.0)
+        away = np.where(ahead & np.isfinite(away), away, np.inf)
+        nearest = away.min(axis=1)
+        if not nearest.min() <= within:
+            return None
+        depth = np.take_along_axis(deep, away.argmin(axis=1)[:, None], axis=1)[:, 0]
+        as_near = nearest <= nearest.min() + 1.0  # [px], includes cables that cross there
+        return int(np.argmin(np.where(as_near, depth, np.inf)))
 
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera

@@ -21,7 +21,7 @@ from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import ForceUnit, cables_text, force_unit, number_text
-from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of, tension_chart
+from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of
 
 CABLES: Final = {
     "none": "massless cables",
@@ -72,7 +72,7 @@ class PlayedPlan(Played):
         """Charts of the limited tensions and the lengths, and spans of infeasible poses."""
         plan, limited = self.plan, self.robot.tension_limits_of
         name = "Chord tension" if limited == "chord" else "Tension at the winch"
-        tension = tension_chart(name, self.robot, plan.state.limited_tension, limited)
+        tension = Chart.of_tensions(name, self.robot, plan.state.limited_tension, limited)
         length = Chart("Unstrained length", "m", 4, tension.names, lambda rows: plan.unstrained_length[rows])
         paths = (("desired", WANTED), ("actual", ACTUAL))
         return Track(self.time, (tension, length), _infeasible_spans(plan, self.time), (), paths)
@@ -171,8 +171,8 @@ class PlayedSimulation(Played):
 
     def track(self) -> Track:
         """Charts of the tensions at the frame ends and the displacement, and the events."""
-        simulation, unit = self.simulation, force_unit(self.robot)
-        tension, position = tension_chart("Tension at the winch", self.robot, self.tension), simulation.pose.position
+        simulation, unit, position = self.simulation, force_unit(self.robot), self.simulation.pose.position
+        tension = Chart.of_tensions("Tension at the winch", self.robot, self.tension)
         axes, began = ("x", "y", "z"), float(simulation.time[0])
         away = Chart("Motion along x, y, z", "mm", 1, axes, lambda rows: 1e3 * (position[rows] - position[0]))
         events = simulation.events

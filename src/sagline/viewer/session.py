@@ -24,7 +24,7 @@ from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
 from sagline.viewer.tension_scale import force_unit, number_text
-from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of, tension_chart
+from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of
 
 PER_METER = 1e3  # mm per m
 MOST_EVENTS = 8  # largest number of listed events, the newest
@@ -127,7 +127,7 @@ class PlayedLog(Played):
 
     def track(self) -> Track:
         """Charts of the tensions and of the errors of tensions, lengths and position, and the events."""
-        tension, axes = tension_chart("Tension, measured", self.robot, self.tension), ("x", "y", "z")
+        tension, axes = Chart.of_tensions("Tension, measured", self.robot, self.tension), ("x", "y", "z")
         cables = tension.names
 
         def error(value: Array, reference: Array, scale: float = PER_METER) -> Callable[[slice], Array]:

@@ -141,6 +141,24 @@ class Solid(NamedTuple):
     vertices: Array  # corners [m], shape (v, 3)
     faces: Indices  # triangles, as indices of corners, counter-clockwise from outside, shape (f, 3)
 
+    def ray_distance(self, start: Array, direction: Array) -> float | None:
+        """Distance along a ray to the surface, in lengths of `direction`; None without an intersection.
+
+        Source:
+            Moeller & Trumbore, J. Graphics Tools 2, 1997.
+        """
+        first, second, third = np.moveaxis(self.vertices[self.faces], 1, 0)
+        one, two, gap = second - first, third - first, start - first
+        across = np.cross(direction, two)
+        volume = np.einsum("fi,fi->f", one, across)
+        flat = np.abs(volume) <= 1e-14 * np.abs(one).max() * np.abs(two).max() * np.abs(direction).max()
+        volume = np.where(flat, np.nan, volume)
+        other = np.cross(gap, one)
+        u, v = np.einsum("fi,fi->f", gap, across) / volume, other @ direction / volume
+        far = np.einsum("fi,fi->f", two, other) / volume
+        hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (far > 0.0)
+        return float(far[hit].min()) if hit.any() else None
+
 
 def size_of(robot: Robot) -> float:
     """Diagonal of the robot's box [m]."""

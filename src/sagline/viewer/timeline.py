@@ -40,6 +40,16 @@ class Chart:
     values: Callable[[slice], Array]
     limits: tuple[ChartLimit, ...] = ()  # limits of the values
 
+    @classmethod
+    def of_tensions(cls, title: str, robot: Robot, tension: Array, at: str = "frame_end") -> Chart:
+        """Chart of tensions (N, m) [N] of the part `at` of the cables, with the tightest limits of all cables."""
+        unit, low, high = force_unit(robot), float(robot.tension_min.max()), float(robot.tension_max.min())
+        other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
+        lower = ((low / unit.newtons, f"lowest allowed{other}", False),) if low > 0.0 else ()
+        upper = ((high / unit.newtons, f"highest allowed{other}", True),) if isfinite(high) else ()
+        names = tuple(map(str, range(robot.cable_count)))
+        return cls(title, unit.name, unit.decimals, names, lambda rows: tension[rows] / unit.newtons, lower + upper)
+
     @property
     def of_cables(self) -> bool:
         """True if the lines of the chart are cables."""
@@ -66,16 +76,6 @@ class Track:
         """Time of a sample [s]: `steps` samples after the sample at `time`."""
         now = int(np.searchsorted(self.time, time, side="right")) - 1
         return float(self.time[min(max(now + steps, 0), self.time.size - 1)])
-
-
-def tension_chart(title: str, robot: Robot, tension: Array, at: str = "frame_end") -> Chart:
-    """Chart of tensions (N, m) [N] of the part `at` of the cables, with the tightest limits of all cables."""
-    unit, low, high = force_unit(robot), float(robot.tension_min.max()), float(robot.tension_max.min())
-    other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
-    lower = ((low / unit.newtons, f"lowest allowed{other}", False),) if low > 0.0 else ()
-    upper = ((high / unit.newtons, f"highest allowed{other}", True),) if isfinite(high) else ()
-    names = tuple(map(str, range(robot.cable_count)))
-    return Chart(title, unit.name, unit.decimals, names, lambda rows: tension[rows] / unit.newtons, lower + upper)
 
 
 MOST_SPANS: Final = 400  # largest number of spans on a timeline; close ones are joined

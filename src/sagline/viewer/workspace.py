@@ -125,6 +125,22 @@ class Hull:
             for k in np.unique(bands).tolist()
         ]
 
+    def near_patches(self, position: Array, reach: float) -> list[Patch]:
+        """Patches of the wall within `reach`, in the colors of the limiting cables. Nearer patches are more opaque."""
+        # the faces of the robot's box are not a wall
+        near = np.linalg.norm(self.vertices - position, axis=1) < reach + self.longest
+        faces_near = np.flatnonzero(near[self.faces].any(axis=1) & ~self.on_box)
+        corners, owner = _quartered(self.vertices[self.faces[faces_near]]), np.repeat(self.owner[faces_near], 4)
+        away = np.linalg.norm(corners.mean(axis=1) - position, axis=1) / reach
+        patches = []
+        for (least, most), opacity in zip(pairwise(_RINGS), _OPACITIES, strict=True):
+            ring = (away >= least) & (away < most)
+            for cable in np.unique(owner[ring]).tolist():
+                chosen = _on_both_sides(corners[ring & (owner == cable)], BESIDE * reach)
+                faces = np.arange(3 * len(chosen)).reshape(-1, 3)
+                patches.append(Patch(chosen.reshape(-1, 3), faces, cable_color(cable), opacity))
+        return patches
+
 
 def region_in(query: WorkspaceQuery, rough: bool) -> Region:
     """The region to search, with as many cells as a cube of `CELLS` along each edge; `rough`: half of it per edge."""
@@ -204,23 +220,6 @@ _RINGS: Final = (0.0, 0.4, 0.7, 1.0)  # radii of the rings, relative to the reac
 _OPACITIES: Final = (0.6, 0.35, 0.15)  # opacity in each ring; two patches lie behind each other
 
 
-def near_patches(hull: Hull, position: Array, reach: float) -> list[Patch]:
-    """Patches of the wall within `reach`, in the colors of the limiting cables. Nearer patches are more opaque."""
-    # the faces of the robot's box are not a wall
-    near = np.linalg.norm(hull.vertices - position, axis=1) < reach + hull.longest
-    faces_near = np.flatnonzero(near[hull.faces].any(axis=1) & ~hull.on_box)
-    corners, owner = _quartered(hull.vertices[hull.faces[faces_near]]), np.repeat(hull.owner[faces_near], 4)
-    away = np.linalg.norm(corners.mean(axis=1) - position, axis=1) / reach
-    patches = []
-    for (least, most), opacity in zip(pairwise(_RINGS), _OPACITIES, strict=True):
-        ring = (away >= least) & (away < most)
-        for cable in np.unique(owner[ring]).tolist():
-            chosen = _on_both_sides(corners[ring & (owner == cable)], BESIDE * reach)
-            faces = np.arange(3 * len(chosen)).reshape(-1, 3)
-            patches.append(Patch(chosen.reshape(-1, 3), faces, cable_color(cable), opacity))
-    return patches
-
-
 def margin_text(margin: float, cable: int, unit: ForceUnit) -> str:
     """Text of the margin at the platform and of the limiting cable."""
     by = f", cable {cable}" if cable >= 0 else ""
@@ -268,6 +267,23 @@ class _FreeTravel:
         """End points [m], shape (K, 3)."""
         return np.asarray(self.start + self.distance[:, None] * DIRECTIONS[self.which])
 
+    def text(self, unit: ForceUnit, without: str = "") -> str:
+        """HTML: margin, nearest boundary with its limit, and a table of all directions."""
+        head = f"<b>Margin</b> {unit.written(self.margin)}{without}<br>"
+        crossed = [k for k in range(len(self.which)) if self.crossed[k]]
+        if crossed:
+            nearest = min(crossed, key=lambda k: float(self.distance[k]))
+            length, way = f"{self.distance[nearest]:.3f} m", NAMES[self.which[nearest]]
+            head += f"<b>Boundary</b> {length} along {way}" if self.inside else f"<b>Workspace</b> {length} along {way}"
+            head += f", cable {self.cable[nearest]} limits" if self.cable[nearest] >= 0 else ""
+        else:
+            head += "No boundary along any axis within the robot's box."
+        rows = (
+            (NAMES[which], f"{distance:.3f} m", _end(bool(crossed), int(cable), self.inside))
+            for which, distance, crossed, cable in zip(self.which, self.distance, self.crossed, self.cable, strict=True)
+        )
+        return html_block(head + table_html(("direction", "length", "ends at"), rows))
+
 
 def free_directions(robot: Robot, flat: int | None) -> Indices:
     """Indices of the `DIRECTIONS` of free motion, shape (K,); `flat` is the normal of a planar region."""
@@ -307,24 +323,6 @@ def _levels_at(find: Find, places: Array) -> tuple[Array, Indices]:
     """Levels and limiting cables at positions (K, S, 3)."""
     found = find(places.reshape(-1, 3))
     return found.level.reshape(places.shape[:2]), found.cable.reshape(places.shape[:2])
-
-
-def travel_text(found: _FreeTravel, unit: ForceUnit, without: str = "") -> str:
-    """HTML: margin, nearest boundary with its limit, and a table of all directions."""
-    head = f"<b>Margin</b> {unit.written(found.margin)}{without}<br>"
-    crossed = [k for k in range(len(found.which)) if found.crossed[k]]
-    if crossed:
-        nearest = min(crossed, key=lambda k: float(found.distance[k]))
-        length, way = f"{found.distance[nearest]:.3f} m", NAMES[found.which[nearest]]
-        head += f"<b>Boundary</b> {length} along {way}" if found.inside else f"<b>Workspace</b> {length} along {way}"
-        head += f", cable {found.cable[nearest]} limits" if found.cable[nearest] >= 0 else ""
-    else:
-        head += "No boundary along any axis within the robot's box."
-    rows = (
-        (NAMES[which], f"{distance:.3f} m", _end(bool(crossed), int(cable), found.inside))
-        for which, distance, crossed, cable in zip(found.which, found.distance, found.crossed, found.cable, strict=True)
-    )
-    return html_block(head + table_html(("direction", "length", "ends at"), rows))
 
 
 def _end(crossed: bool, cable: int, inside: bool) -> str:

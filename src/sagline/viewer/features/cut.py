@@ -15,7 +15,7 @@ from sagline.dynamics.simulation.simulate import losses_after_break, started_run
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.viewer import shapes
-from sagline.viewer.camera import OUTSIDE, camera_of, nearest_line
+from sagline.viewer.camera import OUTSIDE, Camera
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
@@ -195,10 +195,11 @@ class CutFeature(Feature):
 
     def _pick(self, value: Any, client: int) -> None:
         """Mark the cable at a point of the picture; `value` is unchecked data of a client."""
-        at, camera, view = finite_numbers(value, 2, OUTSIDE), camera_of(self._page.server, client), self._page.view
+        at, view = finite_numbers(value, 2, OUTSIDE), self._page.view
+        camera = Camera.of_client(self._page.server, client)
         if at is None or camera is None or view is None or self._page.state is None:
             return
-        cable = nearest_line(camera, at, view.snapshot.courses(view.settings.sag_scale), NEAR)
+        cable = camera.nearest_line(at, view.snapshot.courses(view.settings.sag_scale), NEAR)
         self._is_marked = cable is not None
         if cable is not None:
             self._cable.value = str(cable)

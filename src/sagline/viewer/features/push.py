@@ -22,7 +22,7 @@ from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import motions_of_ends
 from sagline.statics.stiffness import stiffness
-from sagline.viewer.camera import OUTSIDE, Camera, camera_of, ray_distance
+from sagline.viewer.camera import OUTSIDE, Camera
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
@@ -74,6 +74,23 @@ class PushResponse:
     redistributed: _Reserve  # largest force with feasible tensions at this pose
     compliance: Array  # compliance of the point of application, world axes [m/N], shape (3, 3); NaN if unknown
 
+    @classmethod
+    def of(cls, state: Equilibrium, push: Push) -> PushResponse:
+        """Response to a force, with the model of the state's cables."""
+        robot, model, step = state.one_robot, state.cables.model, "Choose another cable model."
+        if isinstance(model, Straight):
+            raise InvalidValueError("push: cable model", "straight", "one that stretches", step)
+        found = forward(robot, state.unstrained_length, state.pose, model, push.wrench(state))
+        lever, weight = push.at - robot.center_of_mass, robot.mass * robot.gravity
+        largest = weight + float(robot.tension_max.sum())  # upper bound of the forces that the cables can balance [N]
+        if not np.isfinite(largest):
+            largest = BEYOND * (weight + float(np.nansum(state.limited_tension)))
+        arm = motions_of_ends(state.pose.matrix @ lever)
+        loaded, compliance = found.state if bool(found.solved) else None, arm @ stiffness(state).compliance @ arm.T
+        unit = Push(push.force / np.linalg.norm(push.force), push.at)
+        reserves = _reserve(state, unit, largest), _redistributed(state, unit, largest)
+        return cls(push, state, loaded, *reserves, locked(compliance))
+
     @property
     def force(self) -> float:
         """Magnitude of the force [N]."""
@@ -100,19 +117,6 @@ class PushResponse:
         rest, rotation = self.state.pose, Rotation.from_rotvec(factor * self.rotation) * self.state.pose.rotation
         place = rest.transform(self.push.at) + factor * self.displacement
         return Pose(place - rotation.as_matrix() @ self.push.at, rotation)
-
-
-def push_response(state: Equilibrium, push: Push) -> PushResponse:
-    """Response to a force, with the model of the state's cables."""
-    if isinstance(state.cables.model, Straight):
-        raise InvalidValueError("push: cable model", "straight", "one that stretches", "Choose another cable model.")
-    found = forward(state.one_robot, state.unstrained_length, state.pose, state.cables.model, push.wrench(state))
-    lever = push.at - state.one_robot.center_of_mass
-    arm = motions_of_ends(state.pose.matrix @ lever)
-    loaded, compliance = found.state if bool(found.solved) else None, arm @ stiffness(state).compliance @ arm.T
-    unit, largest = Push(push.force / np.linalg.norm(push.force), push.at), _upper_bound(state)
-    reserves = _reserve(state, unit, largest), _redistributed(state, unit, largest)
-    return PushResponse(push, state, loaded, *reserves, locked(compliance))
 
 
 def semi_axes(compliance: Array) -> tuple[Array, Array]:
@@ -170,15 +174,6 @@ def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[flo
         low, high = float(forces[first - 1]) if first else low, float(forces[first])
         forces = np.linspace(low, high, FORCES + 1)[1:]
     return low, high
-
-
-def _upper_bound(state: Equilibrium) -> float:
-    """Upper bound of the forces that the cables of the robot can balance [N]."""
-    robot = state.one_robot
-    weight = robot.mass * robot.gravity
-    if np.isfinite(robot.tension_max).all():
-        return weight + float(robot.tension_max.sum())
-    return BEYOND * (weight + float(np.nansum(state.limited_tension)))
 
 
 COLOR: Final = (200, 60, 130)  # color with a contrast of 3 : 1 on both backgrounds, different from platforms
@@ -281,7 +276,7 @@ class PushFeature(Feature):
             elif state is None:
                 self._show_none(sentence("The response to a force is computed at a feasible pose at rest."))
             else:
-                self._show(push_response(state, push), view.settings.error_scale)
+                self._show(PushResponse.of(state, push), view.settings.error_scale)
         except SaglineError as error:
             self._show_none(refused(str(error)))
 
@@ -356,7 +351,7 @@ class PushFeature(Feature):
         if not isinstance(value, dict):
             return
         phase, at = value.get("phase"), finite_numbers(value.get("at"), 2, OUTSIDE)
-        camera, state = camera_of(self._page.server, client), self._page.state
+        camera, state = Camera.of_client(self._page.server, client), self._page.state
         if at is None or camera is None:
             return
         if phase == "start":
@@ -378,7 +373,7 @@ class PushFeature(Feature):
             return
         back = state.pose.matrix.T
         start, direction = back @ (camera.place - state.pose.position), back @ camera.ray(at)
-        distance = ray_distance(self.body, start, direction)
+        distance = self.body.ray_distance(start, direction)
         if distance is not None:
             self.hold = client, start + distance * direction
             return

@@ -249,7 +249,7 @@ class RegionFeature(Feature):
             text += self._without
             *_, hull = self._result
             if hull is not None:
-                patches = workspace.near_patches(hull, self._place, workspace.REACH * self._size)
+                patches = hull.near_patches(self._place, workspace.REACH * self._size)
             what = "tension to its nearest limit" if is_underconstrained(self._levels.robot) else "force with moment"
             self._margin_html.content = html_block(f"<b>Margin here</b>, {what}: {text}")
         with self._server.atomic():
@@ -291,7 +291,7 @@ class RegionFeature(Feature):
             return
         which = workspace.free_directions(robot, region.flat)
         travel = workspace.free_travel(levels.details, pose.position, which, region.low, region.high)
-        self._travel_html.content = workspace.travel_text(travel, force_unit(robot), self._without)
+        self._travel_html.content = travel.text(force_unit(robot), self._without)
         # an arrow that ends at the boundary has its length as text
         ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
         self._nodes.arrows("/travel", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))

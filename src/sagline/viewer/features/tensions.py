@@ -41,9 +41,12 @@ class DotField:
     high: Array  # highest coordinates of the drawing [N], shape (r,)
 
     @classmethod
-    def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
-        """Make the drawing of a nonempty polygon, for one or two redundant cables."""
-        corners, sides = polygon.vertices, polygon.sides
+    def of(cls, snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
+        """Feasible tensions at the pose of `snapshot`, with the sag forces of the cables; None if there are none."""
+        polygon = _polygon(snapshot)
+        if polygon is None or not len(polygon.vertices):
+            return None
+        corners, sides, dot = polygon.vertices, polygon.sides, polygon.coordinates(snapshot.tension)
         low, high = _extent(polygon, dot) if before is None else (before.low, before.high)
         if not polygon.bounded:
             corners, sides = _clipped(corners, sides, low, high)
@@ -150,7 +153,7 @@ def polygon_figure(
     """HTML: polygon with the chosen tensions; interval for one redundant cable; otherwise a sentence."""
     if remark := _why_not_drawn(snapshot):
         return sentence(remark)
-    drawn = dot_field_of(snapshot) if field is None else field
+    drawn = DotField.of(snapshot) if field is None else field
     if drawn is None:
         return sentence("No tensions within the limits balance the platform.")
     movable = field is not None
@@ -164,14 +167,6 @@ def _why_not_drawn(snapshot: Snapshot) -> str:
     if redundant > MOST_REDUNDANT:
         return f"{redundant} redundant cables: the feasible tensions cannot be drawn in a plane."
     return "No redundant cable: the force balance determines the tensions." if redundant <= 0 else ""
-
-
-def dot_field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
-    """Feasible tensions at the pose of `snapshot`, with the sag forces of the cables; None if there are none."""
-    polygon = _polygon(snapshot)
-    if polygon is None or not len(polygon.vertices):
-        return None
-    return DotField.of(polygon, polygon.coordinates(snapshot.tension), before)
 
 
 def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
@@ -333,7 +328,7 @@ class TensionsFeature(Feature):
             state = snapshot.plan.state
             place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
             key = (*place, view.settings.changes, type(state.cables.model))
-            self._field = dot_field_of(snapshot, before if key == self._key else None)
+            self._field = DotField.of(snapshot, before if key == self._key else None)
             if key != self._key or not isinstance(snapshot.plan.tension, ByHand):
                 self._aim = None
             self._key = key
