@@ -18,7 +18,7 @@ from sagline.viewer.features import calibration as feature
 from sagline.viewer.features.calibration import FIELD
 from sagline.viewer.page import Page
 from sagline.viewer.panel import written_mass
-from sagline.viewer.shapes import ball, error_ellipsoids, placed_balls, readable
+from sagline.viewer.shapes import Solid, error_ellipsoids, placed_balls, readable
 from tests.calibration.made_up import made_up, parameters
 from tests.tiers import extended
 from tests.viewer.client import Client, await_that
@@ -73,7 +73,7 @@ def test_an_ellipsoid_is_its_covariance(seed: int) -> None:
 
 
 def test_a_ball_has_the_radius_1_all_around() -> None:
-    body = ball()
+    body = Solid.ball()
     np.testing.assert_allclose(np.linalg.norm(body.vertices, axis=1), 1.0, rtol=1e-12)
     np.testing.assert_allclose(body.vertices.mean(axis=0), 0.0, atol=1e-12)
 

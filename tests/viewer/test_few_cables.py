@@ -11,7 +11,7 @@ from sagline.viewer.feature import View
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
 from sagline.viewer.page import Page, Source
-from sagline.viewer.snapshot import Settings, missing_of, snapshot_at
+from sagline.viewer.snapshot import MissingWrench, Settings, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.workspace import WorkspaceQuery
 from tests.kinematics.test_underconstrained import suspended
@@ -57,7 +57,7 @@ def test_a_position_without_equilibrium_names_the_cables_and_no_force() -> None:
     assert not snapshot.feasible
     assert snapshot.plan is not None
     assert snapshot.reason.endswith(", ".join(map(str, np.flatnonzero(snapshot.plan.blocking))))
-    assert missing_of(snapshot) is None
+    assert MissingWrench.of(snapshot) is None
 
 
 def test_copied_code_gives_the_same_tensions() -> None:

@@ -10,8 +10,8 @@ import sagline as sl
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.proof import force_polygon_figure, forces_on_platform, residual
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.snapshot import Settings, missing_of, snapshot_at
-from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.snapshot import MissingWrench, Settings, snapshot_at
+from sagline.viewer.tension_scale import ForceUnit
 from tests.tiers import wide
 from tests.viewer.client import Client, await_that
 from tests.viewer.planar import PLANAR
@@ -128,14 +128,14 @@ def test_the_largest_force_has_three_digits_at_least(name: str) -> None:
     rows = re.findall(ROW, force_polygon_figure(state))
     forces = np.array([[float(cell) for cell in re.findall(r"<td>([^<]*)</td>", cells)][:3] for _, cells in rows])
     expected = np.array([each.wrench[:3] for each in sorted(forces_on_platform(state), key=lambda each: each.name)])
-    expected /= force_unit(robot).newtons
+    expected /= ForceUnit.of(robot).newtons
     np.testing.assert_allclose(forces, expected, rtol=0.0, atol=6e-4 * np.abs(expected).max())
 
 
 def test_the_gap_is_the_missing_force() -> None:
     robot = sl.load_robot("cogiro")
     snapshot = snapshot_at(robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), Settings(mass=robot.mass), None)
-    missing = missing_of(snapshot)
+    missing = MissingWrench.of(snapshot)
     assert missing is not None
     pulls = forces_on_platform(missing.state, missing.wrench)
     assert [each.name for each in pulls][-2:] == ["weight", "missing"]

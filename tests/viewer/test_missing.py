@@ -18,8 +18,8 @@ from sagline.viewer.features.missing import NearestFeasible, explanation, missin
 from sagline.viewer.page import Page, home_pose
 from sagline.viewer.readout import chosen_by
 from sagline.viewer.server import PageServer
-from sagline.viewer.snapshot import Settings, Snapshot, missing_of, snapshot_at
-from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.snapshot import MissingWrench, Settings, Snapshot, snapshot_at
+from sagline.viewer.tension_scale import ForceUnit
 from tests.effort import best_rate
 from tests.tiers import extended, wide
 from tests.viewer.client import PATIENCE, Client, await_that
@@ -71,7 +71,7 @@ def least_force(state: sl.Equilibrium, given: np.ndarray, count: int = 1500) -> 
 def test_the_missing_force_agrees_with_a_linear_program(name: str, place: list[float]) -> None:
     robot = sl.load_robot(name)
     snapshot = at(robot, sl.Pose(place, np.eye(3)))
-    missing = missing_of(snapshot)
+    missing = MissingWrench.of(snapshot)
     assert missing is not None
     assert snapshot.plan is not None
     size = float(np.linalg.norm(missing.force))
@@ -84,14 +84,14 @@ def test_the_missing_force_agrees_with_a_linear_program(name: str, place: list[f
     assert force < 1e-6 * missing.state.chord_tension.max()
     assert moment < 1e-6 * missing.state.chord_tension.max()
     np.testing.assert_allclose(missing.state.wrench, missing.wrench)
-    assert f"{force_unit(robot).written(size)} missing" == missing_label(missing, force_unit(robot))
+    assert f"{ForceUnit.of(robot).written(size)} missing" == missing_label(missing, ForceUnit.of(robot))
 
 
 @pytest.mark.parametrize(("name", "place"), wide(CASES, len(FIRST)))
 def test_blocking_cables_are_at_limits_that_would_help(name: str, place: list[float]) -> None:
     robot = sl.load_robot(name)
     snapshot = at(robot, sl.Pose(place, np.eye(3)))
-    missing = missing_of(snapshot)
+    missing = MissingWrench.of(snapshot)
     assert missing is not None
     assert missing.limits
     before = float(np.linalg.norm(missing.force))
@@ -103,7 +103,7 @@ def test_blocking_cables_are_at_limits_that_would_help(name: str, place: list[fl
             low[cable] *= 0.9
         else:
             high[cable] *= 1.1
-        wider = missing_of(at(robot.replace(tension_min=low, tension_max=high), snapshot.pose))
+        wider = MissingWrench.of(at(robot.replace(tension_min=low, tension_max=high), snapshot.pose))
         assert wider is not None
         assert np.linalg.norm(wider.force) < before
 
@@ -114,7 +114,7 @@ def test_a_moment_is_shown_if_no_force_is_sufficient() -> None:
     snapshot = at(robot, pose)
     assert snapshot.plan is not None
     assert np.isinf(snapshot.plan.shortfall)
-    missing = missing_of(snapshot)
+    missing = MissingWrench.of(snapshot)
     assert missing is not None
     assert not least_force(missing.state, np.zeros(6), 50)[1]
     assert least_force(missing.state, missing.wrench * (1.0 + 1e-7), 50)[0] < 1e-3 * np.linalg.norm(missing.force)
@@ -159,7 +159,7 @@ def test_a_load_is_considered() -> None:
     load = locked(np.array([0.0, 0.0, 1e5, 0.0, 0.0, 0.0]))
     pose = sl.Pose([0.0, 0.0, 2.0], np.eye(3))
     snapshot = snapshot_at(robot, pose, Settings(mass=robot.mass), None, wrench=load)
-    missing = missing_of(snapshot)
+    missing = MissingWrench.of(snapshot)
     assert missing is not None
     weight = robot.mass * robot.gravity
     assert -missing.force[2] > 1e5 - 60.0 * weight  # cables from above hardly pull down
@@ -169,7 +169,7 @@ def test_a_load_is_considered() -> None:
 
 def test_a_planar_robot_is_explained_in_its_plane() -> None:
     pose = sl.Pose([2.0, 0.0, 3.5], np.eye(3))
-    missing = missing_of(at(PLANAR, pose))
+    missing = MissingWrench.of(at(PLANAR, pose))
     assert missing is not None
     assert missing.force[1] == 0.0
     assert missing.force[2] > 0.0
@@ -190,7 +190,7 @@ def test_other_reasons_are_explained() -> None:
     assert lost.plan is None
     nearest = nearest_feasible(robot, anchor, sl.Catenary(), None)
     assert isinstance(nearest, NearestFeasible)
-    assert "Go there" in explanation(lost, missing_of(lost), nearest, searching=False)
+    assert "Go there" in explanation(lost, MissingWrench.of(lost), nearest, searching=False)
     upside = sl.Pose([1.0, 0.5, 6.0], np.eye(3))  # cables level
     singular = at(robot, upside)
     if singular.status is sl.PoseStatus.SINGULAR:

@@ -10,7 +10,7 @@ import sagline as sl
 from sagline.viewer import readout
 from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
-from sagline.viewer.snapshot import Settings, missing_of, snapshot_at
+from sagline.viewer.snapshot import MissingWrench, Settings, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.timeline import COLORS
 
@@ -96,7 +96,7 @@ def test_numbers_have_correct_signs_and_fit_their_columns() -> None:
 
 def test_infeasible_pose_shows_a_compromise_or_dashes_and_the_reason() -> None:
     snapshot = snapshot_at(ROBOT, sl.Pose([7.2, 3.0, 1.5], np.eye(3)), Settings(mass=50.0), None)
-    missing = missing_of(snapshot)
+    missing = MissingWrench.of(snapshot)
     assert missing is not None
     html = readout.numbers_html(snapshot, SCALE, None, missing.state)
     told = np.array([[float(cell) for cell in row[1:]] for row in cells(html)])

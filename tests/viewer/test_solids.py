@@ -37,7 +37,7 @@ def test_every_preset_has_its_parts(name: str) -> None:
 
 def test_a_tube_has_the_given_length_and_thickness() -> None:
     points = np.linspace([0.0, 0.0, 0.0], [0.0, 3.0, 4.0], 9)
-    area = mesh(shapes.tube(points, 0.1, sides=64)).area
+    area = mesh(shapes.Solid.tube(points, 0.1, sides=64)).area
     assert area == pytest.approx(2.0 * np.pi * 0.1 * 5.0, rel=2e-3)
 
 
@@ -64,7 +64,7 @@ def test_scale_bars_have_round_lengths(length: float, rounded: float) -> None:
 
 
 def test_a_pulley_is_at_the_entry_of_its_cable_with_its_radius() -> None:
-    wheel = mesh(shapes.wheel())
+    wheel = mesh(shapes.Solid.wheel())
     assert wheel.bounds[0] == pytest.approx([0.03, -0.1, -0.97], abs=0.01)  # entered at the origin, a bit of room
     assert wheel.bounds[1] == pytest.approx([1.97, 0.1, 0.97], abs=0.01)
     assert wheel.volume > 0.0
@@ -96,4 +96,4 @@ def test_marks_replace_invisible_pulleys_and_drums_are_drawn() -> None:
 def test_a_tube_omits_repeated_points() -> None:
     points = np.linspace([0.0, 0.0, 0.0], [0.0, 3.0, 4.0], 9)
     twice = np.repeat(points, 2, axis=0)
-    assert np.array_equal(shapes.tube(twice, 0.1).vertices, shapes.tube(points, 0.1).vertices)
+    assert np.array_equal(shapes.Solid.tube(twice, 0.1).vertices, shapes.Solid.tube(points, 0.1).vertices)

@@ -30,7 +30,7 @@ from sagline.viewer.panel import ControlPanel
 from sagline.viewer.player import Beside, InMotion, Played, Player
 from sagline.viewer.robot_scene import APART, TRACE_POINTS, RobotScene
 from sagline.viewer.server import Channel
-from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, missing_of, snapshot_at
+from sagline.viewer.snapshot import MissingWrench, Settings, Snapshot, depends_on_history, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 
 FRAME_TIME = 1.0 / 60.0  # shortest time between updates [s]
@@ -249,7 +249,7 @@ class Page:
             return
         played = player.played if player.following else None
         scale, ghost = panel.color_scale(snapshot.tension), bool(panel.ghost.value)
-        missing = None if isinstance(snapshot, InMotion) or snapshot.feasible else missing_of(snapshot)
+        missing = None if isinstance(snapshot, InMotion) or snapshot.feasible else MissingWrench.of(snapshot)
         view = View(snapshot, settings, scale, ghost, self.wrench, played, missing, playing=player.playing)
         with self.server.atomic():
             if played is not None:

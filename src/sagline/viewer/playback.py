@@ -20,7 +20,7 @@ from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import ForceUnit, cables_text, force_unit, number_text
+from sagline.viewer.tension_scale import ForceUnit, cables_text, number_text
 from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of
 
 CABLES: Final = {
@@ -86,7 +86,7 @@ class PlayedPlan(Played):
 
 def _infeasible_spans(plan: Plan, time: Array) -> tuple[Span, ...]:
     """Time spans in which a plan of N poses is not feasible or not stable."""
-    unit = force_unit(plan.state.one_robot)
+    unit = ForceUnit.of(plan.state.one_robot)
 
     def why(rows: slice) -> str:
         lost = plan.status[rows] == PoseStatus.INFEASIBLE
@@ -133,7 +133,7 @@ class PlayedSimulation(Played):
 
     def at(self, time: float) -> InMotion:
         """The sample at or before a time [s]."""
-        simulation, unit, k = self.simulation, force_unit(self.robot), self.index_at(time)
+        simulation, unit, k = self.simulation, ForceUnit.of(self.robot), self.index_at(time)
         now = float(simulation.time[k])
         past = [event for event in simulation.events if event.time <= now]
         broken = [event.cable for event in past if event.kind == "break" and event.cable is not None]
@@ -171,7 +171,7 @@ class PlayedSimulation(Played):
 
     def track(self) -> Track:
         """Charts of the tensions at the frame ends and the displacement, and the events."""
-        simulation, unit, position = self.simulation, force_unit(self.robot), self.simulation.pose.position
+        simulation, unit, position = self.simulation, ForceUnit.of(self.robot), self.simulation.pose.position
         tension = Chart.of_tensions("Tension at the winch", self.robot, self.tension)
         axes, began = ("x", "y", "z"), float(simulation.time[0])
         away = Chart("Motion along x, y, z", "mm", 1, axes, lambda rows: 1e3 * (position[rows] - position[0]))

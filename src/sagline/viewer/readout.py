@@ -21,7 +21,7 @@ from sagline.robot.robot import Robot
 from sagline.tension.margin import cable_margins, capacity_margin
 from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, cables_text, force_unit, number_text
+from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, cables_text, number_text
 
 EXACT: Final = 1e-9  # [m], smaller distances count as zero
 COMPROMISE: Final = "<div><b>Closest compromise</b>: tensions within the limits; the missing force is unbalanced</div>"
@@ -84,7 +84,7 @@ def numbers_html(
 def legend(scale: TensionScale, robot: Robot, ends: str = "") -> str:
     """Colors of the tensions, as a bar with round numbers below. `ends` names the bar's ends, by default the limits."""
     colors = ",".join(f"{css_color(color)} {100 * k / 11:.0f}%" for k, color in enumerate(scale.bar(12)))
-    unit = force_unit(robot)
+    unit = ForceUnit.of(robot)
     marks = "".join(
         f'<span style="position:absolute;left:{100 * place:.1f}%;transform:translateX(-{100 * place:.0f}%)">'
         f"{float(f'{tick / unit.newtons:.4g}'):g}</span>"
@@ -160,7 +160,7 @@ def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:
 
 def _summary(state: Equilibrium, error: Array | None) -> str:
     """Names and texts of the quantities of a feasible pose, whose confirmed pose has a position `error` (3,) [m]."""
-    unit = force_unit(state.one_robot)
+    unit = ForceUnit.of(state.one_robot)
     rows = [("Tensions", unit.span(state.chord_tension)), ("Nearest limit", _nearest_limit(state, unit))]
     if is_underconstrained(state.one_robot):
         text = f"from the balance of {state.one_robot.cable_count} cables; only the position is given"
@@ -205,7 +205,7 @@ def pose_line(pose: Pose) -> str:
 
 
 def _cable_numbers(robot: Robot, state: Equilibrium | None, scale: TensionScale) -> str:
-    unit, unknown = force_unit(robot), np.full(robot.cable_count, np.nan)
+    unit, unknown = ForceUnit.of(robot), np.full(robot.cable_count, np.nan)
     tension, winch, length, sag, margin = (
         (unknown,) * 5
         if state is None

@@ -245,7 +245,7 @@ class RobotScene:
 
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
         """Draw pulleys in their real size; they swivel with the platform."""
-        wheel, which = shapes.wheel(), self._over_pulleys
+        wheel, which = shapes.Solid.wheel(), self._over_pulleys
         return self._scene.add_batched_meshes_simple(
             "/pulleys", wheel.vertices, wheel.faces, shapes.pulley_rotations(robot, pose)[which],
             robot.frame_anchors[which],

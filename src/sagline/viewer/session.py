@@ -23,7 +23,7 @@ from sagline.robot.robot import Robot
 from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
-from sagline.viewer.tension_scale import force_unit, number_text
+from sagline.viewer.tension_scale import ForceUnit, number_text
 from sagline.viewer.timeline import Chart, Span, Track, limit_violations, spans_of
 
 PER_METER = 1e3  # mm per m
@@ -74,7 +74,7 @@ class PlayedLog(Played):
 
     def at(self, time: float) -> InMotion:
         """The cycle at or before a time [s]."""
-        k, unit = self.index_at(time), force_unit(self.robot)
+        k, unit = self.index_at(time), ForceUnit.of(self.robot)
         state, tension = State(int(self.state[k])), np.asarray(self.tension[k])
         rest, truth = self._pose(self.position, self.quaternion, k), self._pose(self.true, self.true_quaternion, k)
         rows = [("Time", f"{self.time[k]:.2f} s"), ("Cycle late", n(self.late[k], ".2g", "s"))]

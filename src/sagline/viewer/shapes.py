@@ -141,6 +141,57 @@ class Solid(NamedTuple):
     vertices: Array  # corners [m], shape (v, 3)
     faces: Indices  # triangles, as indices of corners, counter-clockwise from outside, shape (f, 3)
 
+    @classmethod
+    def wheel(cls) -> Solid:
+        """A pulley of radius 1 for a cable along x that enters at the origin; its middle is at x = 1."""
+        from trimesh.creation import annulus  # an optional dependency that figures do not require
+
+        rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
+        angle = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
+        out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
+        spokes = [cls.rod(np.array([_WHEEL[1][1] * way, _WHEEL[0][0] * way]), _SPOKE) for way in out]
+        corners = [Solid(ring, np.arange(len(ring)).reshape(-1, 3)) for ring in (rim, hub)]
+        lying = _merged([*corners, *spokes])
+        x, y, z = lying.vertices.T
+        return cls(np.stack((1.0 + x, -z, y), axis=1), lying.faces)
+
+    @staticmethod
+    def rod(ends: Array, radius: float) -> Solid:
+        """A cylinder between the two points `ends`, shape (2, 3)."""
+        along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        left = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.9 else [0.0, 1.0, 0.0])
+        left /= np.linalg.norm(left)
+        angle = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)[:, None]
+        ring = radius * (np.cos(angle) * left + np.sin(angle) * np.cross(along, left))
+        return _hull(np.concatenate((ends[0] + ring, ends[1] + ring)))
+
+    @classmethod
+    def tube(cls, points: Array, radius: float, sides: int = 6) -> Solid:
+        """A thin tube along a line of `points` (P, 3), open at its ends. Repeated points are omitted."""
+        new = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0))
+        points = points[new] if new.sum() > 1 else points
+        forward = np.gradient(points, axis=0)
+        forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+        helper = np.where(np.abs(forward[:, 2:]) > 0.9, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+        left = np.cross(helper, forward)
+        left /= np.linalg.norm(left, axis=1, keepdims=True)
+        up = np.cross(forward, left)
+        angle = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, None, None]
+        rings = points + radius * (np.cos(angle) * left + np.sin(angle) * up)  # (sides, P, 3)
+        count = len(points)
+        here = np.arange(sides)[:, None] * count + np.arange(count - 1)
+        there = np.roll(np.arange(sides), -1)[:, None] * count + np.arange(count - 1)
+        quads = np.stack((here, there, there + 1, here + 1), axis=-1).reshape(-1, 4)
+        return cls(rings.reshape(-1, 3), np.concatenate((quads[:, [0, 1, 2]], quads[:, [0, 2, 3]])))
+
+    @classmethod
+    def ball(cls) -> Solid:
+        """A ball of radius 1."""
+        from trimesh.creation import icosphere  # imported only when needed, because it takes a fifth of the start time
+
+        mesh = icosphere(subdivisions=2)
+        return cls(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))
+
     def ray_distance(self, start: Array, direction: Array) -> float | None:
         """Distance along a ray to the surface, in lengths of `direction`; None without an intersection.
 
@@ -213,25 +264,11 @@ def winch_solid(robot: Robot) -> Solid:
     radius = _WINCH * size_of(robot)
     marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
     up = np.array([0.0, 0.0, radius])
-    parts = [rod(np.stack((place - up, place + up)), radius) for place in np.unique(marked, axis=0)]
+    parts = [Solid.rod(np.stack((place - up, place + up)), radius) for place in np.unique(marked, axis=0)]
     known = None if robot.winches is None else robot.winches.drum_radius
     if known is not None:
-        parts += [rod(ends, thick) for ends, thick in zip(drum_axes(robot), known, strict=True)]
+        parts += [Solid.rod(ends, thick) for ends, thick in zip(drum_axes(robot), known, strict=True)]
     return _merged(parts) if parts else Solid(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-
-
-def wheel() -> Solid:
-    """A pulley of radius 1 for a cable along x that enters at the origin; its middle is at x = 1."""
-    from trimesh.creation import annulus  # an optional dependency that figures do not require
-
-    rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
-    angle = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
-    out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
-    spokes = [rod(np.array([_WHEEL[1][1] * way, _WHEEL[0][0] * way]), _SPOKE) for way in out]
-    corners = [Solid(ring, np.arange(len(ring)).reshape(-1, 3)) for ring in (rim, hub)]
-    lying = _merged([*corners, *spokes])
-    x, y, z = lying.vertices.T
-    return Solid(np.stack((1.0 + x, -z, y), axis=1), lying.faces)
 
 
 def pulley_rotations(robot: Robot, pose: Pose) -> Array:
@@ -239,16 +276,6 @@ def pulley_rotations(robot: Robot, pose: Pose) -> Array:
     half = 0.5 * np.arctan2(*outward(robot, pose).T[::-1])
     zero = np.zeros_like(half)
     return np.stack((np.cos(half), zero, zero, np.sin(half)), axis=1)
-
-
-def rod(ends: Array, radius: float) -> Solid:
-    """A cylinder between the two points `ends`, shape (2, 3)."""
-    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    left = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.9 else [0.0, 1.0, 0.0])
-    left /= np.linalg.norm(left)
-    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)[:, None]
-    ring = radius * (np.cos(angle) * left + np.sin(angle) * np.cross(along, left))
-    return _hull(np.concatenate((ends[0] + ring, ends[1] + ring)))
 
 
 def platform_solid(robot: Robot) -> Solid:
@@ -271,25 +298,6 @@ def platform_solid(robot: Robot) -> Solid:
 def _cuboid(middle: Array, edges: Array) -> Solid:
     """A box along the axes."""
     return _hull(box_corners(middle - 0.5 * edges, middle + 0.5 * edges))
-
-
-def tube(points: Array, radius: float, sides: int = 6) -> Solid:
-    """A thin tube along a line of `points` (P, 3), open at its ends. Repeated points are omitted."""
-    new = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0))
-    points = points[new] if new.sum() > 1 else points
-    forward = np.gradient(points, axis=0)
-    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
-    helper = np.where(np.abs(forward[:, 2:]) > 0.9, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
-    left = np.cross(helper, forward)
-    left /= np.linalg.norm(left, axis=1, keepdims=True)
-    up = np.cross(forward, left)
-    angle = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, None, None]
-    rings = points + radius * (np.cos(angle) * left + np.sin(angle) * up)  # (sides, P, 3)
-    count = len(points)
-    here = np.arange(sides)[:, None] * count + np.arange(count - 1)
-    there = np.roll(np.arange(sides), -1)[:, None] * count + np.arange(count - 1)
-    quads = np.stack((here, there, there + 1, here + 1), axis=-1).reshape(-1, 4)
-    return Solid(rings.reshape(-1, 3), np.concatenate((quads[:, [0, 1, 2]], quads[:, [0, 2, 3]])))
 
 
 def _merged(parts: list[Solid]) -> Solid:
@@ -332,11 +340,3 @@ def readable(radius: Array, size: float) -> float:
     """A round factor that makes the largest radius about as large as a size [m]; 1 without ellipsoids."""
     largest = float(radius.max(initial=0.0))
     return max(round_below(size / largest), 1.0) if largest > 0.0 else 1.0
-
-
-def ball() -> Solid:
-    """A ball of radius 1."""
-    from trimesh.creation import icosphere  # imported only when needed, because it takes a fifth of the start time
-
-    mesh = icosphere(subdivisions=2)
-    return Solid(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))

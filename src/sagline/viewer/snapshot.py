@@ -29,7 +29,7 @@ from sagline.statics.balance import structure_matrix
 from sagline.tension.method import TensionMethod, shared_tension
 from sagline.tension.methods import DEFAULT, MinimumNorm, QuadraticProgram, methods_by_name
 from sagline.viewer import shapes
-from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.tension_scale import ForceUnit
 
 BY_HAND: Final = "chosen by hand"
 
@@ -137,7 +137,7 @@ class Snapshot:
         if self.status is not PoseStatus.INFEASIBLE:
             return self.status.text
         shortfall = float(self.plan.shortfall)
-        missing = force_unit(self.robot).written(shortfall)
+        missing = ForceUnit.of(self.robot).written(shortfall)
         short = f"short of {missing}" if np.isfinite(shortfall) else "no force alone is sufficient"
         if is_underconstrained(self.robot):
             short = "no equilibrium at this position is within the limits"
@@ -274,6 +274,22 @@ class MissingWrench:
     state: Equilibrium  # plan with this wrench, in which the blocking cables are at their limits
     limits: dict[int, bool]  # cables at limits: True at the lower limit, False at the upper limit
 
+    @classmethod
+    def of(cls, snapshot: Snapshot) -> MissingWrench | None:
+        """Missing wrench of an infeasible pose; None for other failures, or if no wrench was found."""
+        plan = snapshot.plan
+        if plan is None or snapshot.status not in _EXPLAINED or is_underconstrained(snapshot.robot):
+            return None
+        robot, state = snapshot.robot, plan.state
+        missing, held = np.zeros(6), plan
+        with suppress(SaglineError):
+            for _ in range(ATTEMPTS):
+                missing += MORE * _step(held)
+                held = inverse(robot, snapshot.pose, state.cables.model, MinimumNorm(), locked(state.wrench + missing))
+                if held.feasible:
+                    return cls(locked(missing), held.state, _limits(plan, held))
+        return None
+
     @property
     def force(self) -> Array:
         """Force of the wrench [N], shape (3,)."""
@@ -283,22 +299,6 @@ class MissingWrench:
     def moment(self) -> Array:
         """Moment of the wrench [N m], shape (3,); zero if a force alone is sufficient."""
         return self.wrench[3:]
-
-
-def missing_of(snapshot: Snapshot) -> MissingWrench | None:
-    """Missing wrench of an infeasible pose; None for other failures, or if no wrench was found."""
-    plan = snapshot.plan
-    if plan is None or snapshot.status not in _EXPLAINED or is_underconstrained(snapshot.robot):
-        return None
-    robot, state = snapshot.robot, plan.state
-    missing, held = np.zeros(6), plan
-    with suppress(SaglineError):
-        for _ in range(ATTEMPTS):
-            missing += MORE * _step(held)
-            held = inverse(robot, snapshot.pose, state.cables.model, MinimumNorm(), locked(state.wrench + missing))
-            if held.feasible:
-                return MissingWrench(locked(missing), held.state, _limits(plan, held))
-    return None
 
 
 def _step(plan: Plan) -> Array:

@@ -117,6 +117,11 @@ class ForceUnit(NamedTuple):
         return int(self.form[1])
 
     @classmethod
+    def of(cls, robot: Robot) -> ForceUnit:
+        """Unit of the forces of a robot; its highest tension determines the unit, which is the same at all poses."""
+        return cls.up_to(TensionScale.of(robot).high)
+
+    @classmethod
     def up_to(cls, highest: float) -> ForceUnit:
         """The unit for forces up to a highest force [N]."""
         return cls("N", 1.0, ".1f") if highest < KILO_FROM else cls("kN", 1e3, ".2f")
@@ -137,11 +142,6 @@ class ForceUnit(NamedTuple):
 def number_text(value: float, form: str) -> str:
     """Text of `value`, or a dash if it is not finite. A number that is rounded to zero does not have a sign."""
     return f"{value:z{form}}" if isfinite(value) else "–"
-
-
-def force_unit(robot: Robot) -> ForceUnit:
-    """Unit of the forces of a robot; its highest tension determines the unit, which is the same at all poses."""
-    return ForceUnit.up_to(TensionScale.of(robot).high)
 
 
 def linear(colors: Colors) -> Colors:

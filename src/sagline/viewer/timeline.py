@@ -12,7 +12,7 @@ import numpy as np
 from sagline.core.arguments import true_runs
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
-from sagline.viewer.tension_scale import cables_text, force_unit
+from sagline.viewer.tension_scale import ForceUnit, cables_text
 
 # Colors of cables by number in charts, different from those of the platform, its path, tensions and verdicts. Their
 # contrast is 3 : 1 on the panels of both themes.
@@ -43,7 +43,7 @@ class Chart:
     @classmethod
     def of_tensions(cls, title: str, robot: Robot, tension: Array, at: str = "frame_end") -> Chart:
         """Chart of tensions (N, m) [N] of the part `at` of the cables, with the tightest limits of all cables."""
-        unit, low, high = force_unit(robot), float(robot.tension_min.max()), float(robot.tension_max.min())
+        unit, low, high = ForceUnit.of(robot), float(robot.tension_min.max()), float(robot.tension_max.min())
         other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
         lower = ((low / unit.newtons, f"lowest allowed{other}", False),) if low > 0.0 else ()
         upper = ((high / unit.newtons, f"highest allowed{other}", True),) if isfinite(high) else ()
@@ -98,7 +98,7 @@ def spans_of(time: Array, wrong: Flags, why: Callable[[slice], str]) -> tuple[Sp
 
 def limit_violations(robot: Robot, time: Array, tension: Array) -> tuple[Span, ...]:
     """Spans in which a tension at the winch, shape (N, m) [N], is not within its limits."""
-    unit, below = force_unit(robot), np.asarray(tension < robot.tension_min)  # NaN is neither above nor below a limit
+    unit, below = ForceUnit.of(robot), np.asarray(tension < robot.tension_min)  # NaN is neither above nor below a limit
     above = np.asarray(tension > robot.tension_max)
 
     def why(rows: slice) -> str:

@@ -22,7 +22,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.readout import chosen_by, color_key, html_block, refused, sentence, table_html, verdict_box
 from sagline.viewer.robot_scene import INFEASIBLE, NO_SHADOW, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
 from sagline.viewer.server import toggle, typed
-from sagline.viewer.shapes import ball, error_ellipsoids, placed_balls, readable
+from sagline.viewer.shapes import Solid, error_ellipsoids, placed_balls, readable
 
 FIELD: Final = "Row of the log"
 LONGEST: Final = 20  # largest number of characters of a requested row
@@ -139,7 +139,7 @@ class CalibrationFeature(Feature):
     def __init__(self, page: Page, found: Calibration) -> None:
         """Build tab and scene of a calibration."""
         self._found, self._go, self._size = found, page.go, shapes.size_of(found.robot)
-        self._nodes, self._ball, self._later = Nodes(page.server.scene), ball(), page.later
+        self._nodes, self._ball, self._later = Nodes(page.server.scene), Solid.ball(), page.later
         self._bands = bands(found)
         _, errors, _ = self._anchors("frame_anchors", relative=False)
         factor = readable(errors, LARGE * self._size)

@@ -24,7 +24,7 @@ from sagline.viewer.player import PlayerState
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.server import finite_numbers
-from sagline.viewer.tension_scale import cables_text, force_unit
+from sagline.viewer.tension_scale import ForceUnit, cables_text
 
 PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # ends of the parts [s]; the first part is short and shown soon
 DURATION: Final = PARTS[-1]
@@ -61,7 +61,7 @@ def peak_of(simulation: Simulation, cut: int) -> tuple[int, float, float]:
 
 def _outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
     """HTML: largest displacement of the platform and highest tension after a cut; `whole`: a complete simulation."""
-    unit, (cable, tension, time) = force_unit(simulation.robot), peak_of(simulation, cut)
+    unit, (cable, tension, time) = ForceUnit.of(simulation.robot), peak_of(simulation, cut)
     limit = float(simulation.robot.tension_max[cable])  # infinite without a limit
     away = np.linalg.norm(simulation.pose.position - simulation.pose.position[0], axis=1)
     far = int(np.argmax(away))
@@ -121,7 +121,7 @@ class CutFeature(Feature):
             nodes.hide("/chosen", "/chosen_name")
             return
         points = view.snapshot.courses(view.settings.sag_scale)[cable]
-        tension = force_unit(state.one_robot).written(float(state.chord_tension[cable]))
+        tension = ForceUnit.of(state.one_robot).written(float(state.chord_tension[cable]))
         nodes.lines("/chosen", shapes.segments(points[None], dashed=False), MARK, _WIDTH)
         nodes.label("/chosen_name", f"cable {cable}: {tension}", points[int(_PLACE * (len(points) - 1))])
         self._button.label = f"Cut cable {cable}"

@@ -26,7 +26,7 @@ from sagline.viewer.readout import css_color, headline, spaced_ticks
 from sagline.viewer.robot_scene import DRUM, INFEASIBLE, PLATFORM, STEEL, TRACE_POINTS, RobotScene
 from sagline.viewer.server import Messages
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import TensionScale, force_unit
+from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
 STRIP: Final = 4.0  # height of the legend in text sizes
 _STOPS = 16  # number of colors of the bar
@@ -35,7 +35,7 @@ _STOPS = 16  # number of colors of the bar
 def _strip_of(view: View, *remarks: str) -> dict[str, Any]:
     """Texts and colors below a picture of a view, as JSON."""
     settings, scale = view.settings, view.scale
-    unit = force_unit(view.snapshot.robot)
+    unit = ForceUnit.of(view.snapshot.robot)
     drawn = [(settings.sag_scale, "sag"), (settings.error_scale, "errors")]
     larger = [f"{what} drawn {factor:g} times as large" for factor, what in drawn if factor != 1.0]
     return {
@@ -138,12 +138,12 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     for i, (radius, turn) in enumerate(pulleys):
         if radius > 0.0:
             placed = compose_matrix(scale=np.full(3, radius), translate=robot.frame_anchors[i])
-            _add(scene, f"pulley {i}", shapes.wheel(), DRUM, placed @ quaternion_matrix(turn))
+            _add(scene, f"pulley {i}", shapes.Solid.wheel(), DRUM, placed @ quaternion_matrix(turn))
     thin = _DEAD_RADIUS * shapes.size_of(robot)
     for i, (run, known) in enumerate(zip(*shapes.dead_runs(robot), strict=True)):
         if run[0, 2] != run[1, 2]:
             name = f"dead length {i}" if known else f"dead length {i}, path not known"
-            _add(scene, name, shapes.rod(run, thin), STEEL)
+            _add(scene, name, shapes.Solid.rod(run, thin), STEEL)
     _add(scene, "platform", shapes.platform_solid(robot), PLATFORM if snapshot.solved else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
     for i, course in enumerate(snapshot.courses(sag_scale)):
@@ -151,7 +151,8 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
         for piece in np.split(course, gaps):
             known = piece[np.isfinite(piece[:, 0])]
             if len(known) > 1:
-                _add(scene, f"cable {i}", shapes.tube(known, _CABLE_RADIUS * shapes.size_of(robot)), tuple(colors[i]))
+                solid = shapes.Solid.tube(known, _CABLE_RADIUS * shapes.size_of(robot))
+                _add(scene, f"cable {i}", solid, tuple(colors[i]))
     scene.apply_transform(_Z_UP_TO_Y_UP)
     return bytes(scene.export(file_type="glb"))
 

@@ -17,7 +17,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import headline
 from sagline.viewer.server import finite_numbers
-from sagline.viewer.tension_scale import force_unit, number_text
+from sagline.viewer.tension_scale import ForceUnit, number_text
 
 
 def screen_reader_text(view: View) -> dict[str, str]:
@@ -44,7 +44,7 @@ def _tensions(robot: Robot, tension: Array) -> str:
     known = tension[np.isfinite(tension)]
     if not known.size:
         return ""
-    unit = force_unit(robot)
+    unit = ForceUnit.of(robot)
     form = ".0f" if unit.newtons == 1.0 else ".1f"
     low, high = (number_text(value / unit.newtons, form) for value in (known.min(), known.max()))
     return f"tensions {low} to {high} {unit.name}"

@@ -25,7 +25,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.readout import chosen_by, definitions, html_block
 from sagline.viewer.robot_scene import INFEASIBLE, Nodes
 from sagline.viewer.snapshot import MissingWrench, Snapshot, method_name
-from sagline.viewer.tension_scale import ForceUnit, cables_text, force_unit, number_text
+from sagline.viewer.tension_scale import ForceUnit, cables_text, number_text
 from sagline.viewer.workspace import CELLS, DIRECTIONS, WorkspaceQuery, free_directions
 from sagline.workspaces.region import region_of
 from sagline.workspaces.wrench_sets import WrenchBox
@@ -142,7 +142,7 @@ def missing_label(missing: MissingWrench, unit: ForceUnit) -> str:
 
 
 def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str, str]]:
-    unit = force_unit(snapshot.robot)
+    unit = ForceUnit.of(snapshot.robot)
     parts = ", ".join(unit.bare(part) for part in missing.force)
     size = unit.written(float(np.linalg.norm(missing.force)))
     rows = [("Missing force", f"{size}: x, y, z {parts} {unit.name}")]
@@ -265,7 +265,7 @@ class MissingFeature(Feature):
         start = snapshot.pose.transform(snapshot.robot.center_of_mass)
         tip = start + LONG * self._page.size / size * missing.force
         self._nodes.arrows("/missing", np.stack((start, tip))[None], INFEASIBLE, *(_ARROW * self._page.size))
-        self._nodes.label("/missing_name", missing_label(missing, force_unit(snapshot.robot)), tip)
+        self._nodes.label("/missing_name", missing_label(missing, ForceUnit.of(snapshot.robot)), tip)
 
     def _draw_limits(self, snapshot: Snapshot, missing: MissingWrench | None) -> None:
         """Draw the cables at limits in the colors of these limits, with their names."""

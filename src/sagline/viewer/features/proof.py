@@ -16,7 +16,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.readout import css_color, html_block, sentence, swatch
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import NONE, Color, cable_color, force_unit, number_text
+from sagline.viewer.tension_scale import NONE, Color, ForceUnit, cable_color, number_text
 
 WEIGHT, LOAD, MISSING = "weight", "load", "missing"
 WEIGHT_COLOR: Color = NONE
@@ -169,7 +169,7 @@ def _residual_text(state: Equilibrium, forces: tuple[_PlatformForce, ...], missi
 
 
 def _table(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> str:
-    unit, turning = force_unit(state.one_robot), _can_rotate(state)
+    unit, turning = ForceUnit.of(state.one_robot), _can_rotate(state)
     largest = max(float(np.abs(each.wrench[:3]).max()) for each in forces) / unit.newtons
     decimals = 1 if largest >= 99.95 else 2 if largest >= 9.995 else 3  # limited by the width of the table
     columns = [f"{letter}<sub>{axis}</sub>" for letter in ("FM" if turning else "F") for axis in "xyz"]

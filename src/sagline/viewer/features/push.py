@@ -29,8 +29,8 @@ from sagline.viewer.page import Page
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import NO_SHADOW, Nodes
 from sagline.viewer.server import finite_numbers
-from sagline.viewer.shapes import ball, placed_balls, platform_solid, readable
-from sagline.viewer.tension_scale import ForceUnit, force_unit
+from sagline.viewer.shapes import Solid, placed_balls, platform_solid, readable
+from sagline.viewer.tension_scale import ForceUnit
 
 FORCES: Final = 24  # trials per iteration, which divides the distance between the bounds of a limit by about 23
 ITERATIONS: Final = 4
@@ -192,7 +192,7 @@ LONGEST: Final = 0.6  # longest arrow of a typed force, as a share of the robot'
 def response_text(response: PushResponse, drawn_for: float | None) -> str:
     """HTML of a response. `drawn_for` is the force of the drawn ellipsoid [N]; None without an ellipsoid."""
     robot = response.state.one_robot
-    unit, place = force_unit(robot), "position" if is_underconstrained(robot) else "pose"
+    unit, place = ForceUnit.of(robot), "position" if is_underconstrained(robot) else "pose"
     rows = [
         ("Force", unit.written(response.force)),
         ("Displacement", _motion_text(response)),
@@ -237,12 +237,12 @@ class PushFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Build the folder."""
         self._page, self._size, self._nodes = page, page.size, Nodes(page.server.scene)
-        self.body, self._ball = platform_solid(page.robot), ball()
+        self.body, self._ball = platform_solid(page.robot), Solid.ball()
         mean = float(np.sqrt(page.scale.low * page.scale.high))
         self._stiffness = mean / (FAR * self._size)  # [N/m], force of a drag
         self.hold: tuple[int, Array] | None = None  # client, and the point that it drags, platform frame [m]
         self.response: PushResponse | None = None
-        self._unit = force_unit(page.robot)
+        self._unit = ForceUnit.of(page.robot)
         page.channel.on(TOPIC, self._on_drag)
         page.server.on_client_disconnect(lambda client: page.later(lambda: self._leave(client.client_id)))
         gui, center = page.server.gui, page.robot.center_of_mass.tolist()
@@ -317,7 +317,7 @@ class PushFeature(Feature):
 
     def _show(self, response: PushResponse, error_scale: float) -> None:
         """Draw the force, the largest force in its direction, the displaced platform and the ellipsoid of stiffness."""
-        nodes, size, unit, drawn_for = self._nodes, self._size, force_unit(response.state.one_robot), None
+        nodes, size, unit, drawn_for = self._nodes, self._size, ForceUnit.of(response.state.one_robot), None
         lengths, directions = semi_axes(response.compliance)
         if self._ellipsoid.value and np.isfinite(lengths).all():
             drawn_for = readable(lengths, LARGE * size)

@@ -22,7 +22,7 @@ from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, NO_SHADOW, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Marks, picture_of
 from sagline.viewer.snapshot import given_yaw
-from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.tension_scale import ForceUnit
 from sagline.workspaces.levels import Levels, Plane, slice_of
 from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox
@@ -245,7 +245,7 @@ class RegionFeature(Feature):
         patches: list[workspace.Patch] = []
         if self._region_box.value and self._levels is not None:
             here = self._levels.details(self._place[None])
-            text = workspace.margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
+            text = workspace.margin_text(float(here.margin[0]), int(here.cable[0]), ForceUnit.of(self._levels.robot))
             text += self._without
             *_, hull = self._result
             if hull is not None:
@@ -257,7 +257,7 @@ class RegionFeature(Feature):
             self._nodes.label("/platform/left", text, (0.0, 0.0, -_BELOW * self._size), "top-center", _TEXT_SCALE)
 
     def _follow_slice(self, levels: Levels, region: Region, pose: Pose) -> None:
-        unit = force_unit(levels.robot)
+        unit = ForceUnit.of(levels.robot)
         if self._scaled:
             self._key_html.content = self._scale.key(unit)
         if not self._slice_box.value:
@@ -291,7 +291,7 @@ class RegionFeature(Feature):
             return
         which = workspace.free_directions(robot, region.flat)
         travel = workspace.free_travel(levels.details, pose.position, which, region.low, region.high)
-        self._travel_html.content = travel.text(force_unit(robot), self._without)
+        self._travel_html.content = travel.text(ForceUnit.of(robot), self._without)
         # an arrow that ends at the boundary has its length as text
         ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
         self._nodes.arrows("/travel", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))

@@ -20,7 +20,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.readout import chosen_by, html_block, sentence
 from sagline.viewer.server import finite_numbers
 from sagline.viewer.snapshot import BY_HAND, METHODS, ByHand, MethodMark, MethodMarks, Snapshot, method_name
-from sagline.viewer.tension_scale import force_unit, number_text
+from sagline.viewer.tension_scale import ForceUnit, number_text
 
 WIDTH, BORDER = 340, 26  # width of the drawing, and its margin [px]
 HEIGHTS: Final = (0, 74, 190)  # height of the drawing by the number of redundant cables [px]
@@ -209,7 +209,7 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5.5" class="dot"/>'
     if not movable:
         return dot
-    text = force_unit(snapshot.robot).span(snapshot.tension)
+    text = ForceUnit.of(snapshot.robot).span(snapshot.tension)
     text += "" if snapshot.plan is None else f", {method_name(snapshot.plan.tension)}"
     share = (point[0] - field.low[0]) / max(float(field.high[0] - field.low[0]), 1e-9)
     return (
@@ -236,7 +236,7 @@ def _marks(field: DotField, marks: tuple[MethodMark, ...]) -> str:
 
 
 def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
-    unit = force_unit(snapshot.robot)
+    unit = ForceUnit.of(snapshot.robot)
     how = "Drag the dot, or move it with the arrow keys." if movable else "Dot: the chosen tensions."
     if field.redundant == 1:
         ends = field.polygon.vertices[:, 0]
