@@ -7,8 +7,11 @@ from types import FunctionType, ModuleType
 import pytest
 
 import sagline as sl
+from sagline.core.results import Saved
 from sagline.core.surface import public_names
+from sagline.files.netcdf import writer_of
 from tests.tiers import extended
+from tools.size import public_values
 
 # yaml is allowed: numba loads it
 PACKAGES = ("matplotlib", "xarray", "h5netcdf", "h5py", "pint", "pydantic", "typer", "rich", "scipy.spatial")
@@ -41,6 +44,12 @@ def test_a_module_does_not_hide_the_function_of_its_name(name: str) -> None:
     group, _, function = name.partition(".")
     assert isinstance(module, ModuleType)
     assert isinstance(getattr(getattr(sl, group), function), FunctionType)
+
+
+def test_every_type_with_save_has_a_writer() -> None:
+    for kind in public_values().values():
+        if isinstance(kind, type) and issubclass(kind, Saved):
+            assert callable(writer_of(object.__new__(kind)).save), kind
 
 
 def test_no_folder_bears_the_name_of_a_public_function() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError
-from sagline.calibration.parameters import Parameters, parameters_of
+from sagline.calibration.parameters import Parameters, checked_unknowns, parameters_of
 from tests.calibration.synthetic import usual_sensors, with_drums
 from tests.refusal import refused
 
@@ -58,3 +58,9 @@ def test_a_parameter_without_a_sensor_or_a_prior_is_refused(name: str) -> None:
         asked(COGIRO, name, sensors=blind)
     assert asked(COGIRO, sl.Unknown(name, deviation=0.2), sensors=blind).prior_deviation[0] == 0.2
     assert asked(COGIRO.replace(tolerances={name: 0.1}), name, sensors=blind).prior_deviation[0] == 0.1
+
+
+@pytest.mark.parametrize("item", [np.ones(3), np.ones((3, 3)), 1, None, ["mass"]])
+def test_items_that_are_no_unknowns_are_refused(item: object) -> None:
+    with refused("unknown", kind=InvalidValueError):
+        checked_unknowns([item], usual_sensors())  # type: ignore[list-item]

@@ -275,3 +275,13 @@ def test_a_command_loads_few_modules(words: list[str], most: int, tmp_path: Path
     loaded = done.stdout.split()
     assert len(loaded) <= most
     assert ("sagline.cli.view" in loaded) is (words == ["--help"])
+
+
+def test_a_long_list_of_allowed_words_ends_with_a_whole_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sagline.cli.ending.ALTERNATIVES", 60)
+    line = ["track", "cogiro", "--tension", "nothing"]
+    assert exit_code_of(lambda: app(line, standalone_mode=False)) == 2
+    words = " ".join(capsys.readouterr().err.split())
+    assert "is not one of 'closest', 'minimum-norm', 'lowest-sum' and 8 more. See" in words

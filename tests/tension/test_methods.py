@@ -482,3 +482,18 @@ def test_preferences_of_another_shape_are_refused(rows: object) -> None:
     np.testing.assert_array_equal(
         mean.chord_tension, inverse(robot, pose, tension=QuadraticProgram(target=1.0)).chord_tension
     )
+
+
+def test_an_own_preference_states_root_weights_and_plain_targets() -> None:
+    robot, pose = load_robot("cogiro"), Pose.from_euler([1.0, 0.5, 2.0], 0.0, 0.0, 0.0)
+    weights, target = np.arange(1.0, 9.0), 100.0 * np.arange(1.0, 9.0)
+    own = type("Other", (Own,), {"rows": np.stack((np.sqrt(weights), target))})()
+    found, quadratic = (
+        inverse(robot, pose, Elastic(), tension=each)
+        for each in (own, QuadraticProgram(weights=weights, target=target))
+    )
+    np.testing.assert_array_equal(found.chord_tension, quadratic.chord_tension)
+    # no other tensions in balance are nearer to the targets, with these weights
+    null = np.linalg.svd(structure(robot, pose))[2][6:]
+    assert np.all((found.chord_tension > robot.tension_min) & (found.chord_tension < robot.tension_max))
+    np.testing.assert_allclose(null @ (weights * (found.chord_tension - target)), 0.0, atol=1e-8)

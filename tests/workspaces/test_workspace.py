@@ -267,7 +267,7 @@ def test_faces_without_a_limiting_cable() -> None:
     assert space.limits == ()
 
 
-CONTINUOUS = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centroid, ClosedForm"
+CONTINUOUS = "MinimumNorm, QuadraticProgram, PNorm, Centroid, AnalyticCenter, ClosedForm"
 BAD: dict[str, tuple[dict[str, object], dict[str, str]]] = {  # arguments, and parts of the error
     "tilt twice": (
         {"box": sl.PoseBox(ROOM.low, ROOM.high, 0.1), "orientations": sl.Tilts(0.1)},

@@ -239,7 +239,7 @@ def checked_unknowns(unknowns: Sequence[str | Unknown], sensors: Sensors, *, str
     if not given:
         raise InvalidValueError("unknowns", "none", "at least one", f"Name some of {', '.join(KINDS)}.")
     default = _default_unknowns(sensors, straight=straight)
-    items = [one for item in given for one in (default if item == DEFAULT else (item,))]
+    items = [one for item in given for one in (default if isinstance(item, str) and item == DEFAULT else (item,))]
     found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
     names = [one.name for one in found]
     if twice := [name for name in names if names.count(name) > 1]:

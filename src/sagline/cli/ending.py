@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the shell reports 141 after SIGPIPE
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 REPORT = "the authors of sagline"
+ALTERNATIVES = 165  # largest number of characters of the list of allowed words
 
 
 def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bool = False) -> int:
@@ -112,9 +113,10 @@ def _message(error: BaseException) -> tuple[str, str, int]:
 def _usage(error: BaseException) -> str:
     text = str(error.format_message()).strip().replace(" Value error, ", " ", 1)  # type: ignore[attr-defined]
     if found := re.search(r"'([^']*)' is not one of (.*)", text):
-        from sagline.core.errors import nearest
+        from sagline.core.errors import first_words, nearest
 
         near = nearest(found[1].replace("_", "-"), re.findall(r"'([^']*)'", found[2]))
+        text = text[: found.start(2)] + first_words(found[2].rstrip("."), ALTERNATIVES) + "."
         text += f" Did you mean {near}?" if near else ""
     text = text if text.endswith((".", "?")) else f"{text}."
     context = getattr(error, "ctx", None)

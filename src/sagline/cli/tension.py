@@ -28,7 +28,7 @@ def tension(
     payload: float | None = opt.PAYLOAD,
     files: opt.Files = opt.Files(),
 ) -> int:
-    """Compare nine tension distribution methods at one pose, and draw their tensions into the tension polygon.
+    """Compare tension distribution methods at one pose, and draw their tensions into the tension polygon.
 
     Three methods are left out, because at a single pose their tensions are those of other methods. Closest and
     QuadraticProgram give the tensions of MinimumNorm. PolygonWalk gives those of LowestSum, MinimumNorm or Centroid.

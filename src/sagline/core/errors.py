@@ -45,7 +45,7 @@ class InvalidValueError(SaglineError, ValueError):
     def __str__(self) -> str:
         """Message in one line: item, value, allowed range, next step."""
         others, room = [str(part) for part in (self.item, self.value, self.next_step)], MOST - len(" is ; allowed: . ")
-        allowed = _first_words(str(self.allowed), room - sum(map(len, others)))
+        allowed = first_words(str(self.allowed), room - sum(map(len, others)))
         item, value, next_step, allowed = shortened((*others, allowed), room)
         return f"{item} is {value}; allowed: {allowed}. {next_step}"
 
@@ -181,7 +181,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     return folded[near[0]] if near else None
 
 
-def _first_words(text: str, room: int) -> str:
+def first_words(text: str, room: int) -> str:
     """A list of words in at most `room` characters: the first words and the number of the others."""
     count = text[: max(0, room - len(" and 999 more"))].count(", ")
     if len(text) <= room or count == 0:

@@ -79,7 +79,7 @@ class QuadraticProgram(TensionMethod):
         object.__setattr__(self, "target", checked(self.target, "target", "N", low=0.0))
 
     def preference(self, cables: int) -> Array:
-        """Square roots of the weights, and targets multiplied by these roots, for kernels.
+        """Square roots of the weights, and targets [N], for kernels.
 
         Args:
             cables: Number of cables m.

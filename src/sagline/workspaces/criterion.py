@@ -23,11 +23,10 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.methods import Closest, PolygonWalk
+from sagline.tension.methods import Closest, PolygonWalk, methods_by_name
 
 POSITIVE: Final = MappingProxyType({"above": 0.0})  # allowed ranges of the limits of criteria
 NOT_NEGATIVE: Final = MappingProxyType({"low": 0.0})
-CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centroid, ClosedForm"
 
 
 @dataclass(eq=False)
@@ -214,4 +213,6 @@ def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> No
         return
     jump = "has tensions that jump from pose to pose" if jumps else "depends on the previous pose"
     step = f"{type(first).__name__} needs tensions that are continuous."
-    raise InvalidValueError("tension", f"{type(method).__name__}, which {jump}", CONTINUOUS, step)
+    kinds = methods_by_name().items()
+    allowed = [name for name, kind in kinds if kind.continuous and kind not in (Closest, PolygonWalk)]
+    raise InvalidValueError("tension", f"{type(method).__name__}, which {jump}", ", ".join(allowed), step)
