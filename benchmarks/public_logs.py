@@ -196,8 +196,9 @@ def read_tracked(folder: Path) -> Tracked:
         return np.stack([np.interp(later, time, column) for column in place.T], axis=1)
 
     def distance(offset: float) -> float:
-        away = at(offset) - estimated
-        return float(np.square(away - away.mean(axis=0)).sum())
+        # the estimate of the controller has other scales and axes than the measured positions
+        measured = np.column_stack((at(offset), np.ones(len(own))))
+        return float(np.linalg.lstsq(measured, estimated)[1].sum())
 
     found = at(minimize_scalar(distance, bounds=(-0.5, 0.5), method="bounded").x)
     flat = np.insert(found, 1, 0.0, axis=1)

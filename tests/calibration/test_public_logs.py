@@ -170,7 +170,7 @@ def objects(values: Any) -> Any:
 
 
 def write_tracked(folder: Path) -> None:
-    """A planar robot that moves for 26 s, with wrong length zeros and a controller whose estimate is 2 % too large."""
+    """A planar robot that moves for 26 s, with wrong zeros and scales of lengths and of the controller's estimate."""
     rng = np.random.default_rng(6)
     corners = np.array([[2.95, 0.02], [2.91, 2.36], [0.0, 2.40], [0.0, 0.0]])
     markers = np.array([[0.066, -0.06], [0.066, 0.06], [-0.066, 0.06], [-0.066, -0.06]])
@@ -187,9 +187,9 @@ def write_tracked(folder: Path) -> None:
 
     own = place(0.01 * np.arange(2700))
     lengths = sl.inverse(robot, sl.Pose(np.insert(own, 1, 0.0, axis=1), np.eye(3))).unstrained_length
-    lengths = lengths + np.array([0.05, -0.08, 0.03, 0.1]) + rng.normal(0.0, 5e-4, lengths.shape)
+    lengths = lengths / 0.94 + np.array([0.05, -0.08, 0.03, 0.1]) + rng.normal(0.0, 5e-4, lengths.shape)
     text = ["Start"]
-    for (x, y), row in zip(1.02 * own, lengths, strict=True):
+    for (x, y), row in zip(own * [1.05, 1.1], lengths, strict=True):
         cables = "".join(f"0 8 {-length:.4f} 0.0000\t|\t" for length in row)
         text.append(f"2: {x:.4f} {y:.4f} - {x:.4f} {y:.4f}\t|\t{cables}0")
     file = folder / DIAMONDS

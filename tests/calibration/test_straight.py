@@ -135,6 +135,29 @@ def test_a_planar_robot_is_found_from_lengths_and_positions(pattern: str, seeds:
     assert np.sqrt(np.mean(np.square(errors))) < (2.6e-3 if pattern == "2T" else 5e-3)
 
 
+@pytest.mark.parametrize("seeds", [(3,), pytest.param(range(10), marks=extended)])
+@pytest.mark.parametrize("model", [STRAIGHT, sl.Catenary()], ids=["straight", "catenary"])
+def test_the_scale_of_reported_lengths_is_a_default_unknown(model: sl.CableModel, seeds: Iterable[int]) -> None:
+    """Reported lengths that are 6 % too large, as those of a robot with drums of another radius than assumed."""
+    drawn, errors = planar_robot(PLANAR).replace(motion_pattern="2T"), []
+    for seed in seeds:
+        _, places, log = planar_log(seed, 162)
+        log = log.replace(unstrained_length=log.readings / 0.94)
+        found = sl.calibrate(drawn, log.rows(slice(0, 62)), model=model, folds=0)
+        assert found.status is sl.CalibrationStatus.FOUND
+        (k,) = (k for k, name in enumerate(found.parameters.names) if name == "length_scale")
+        assert abs(found.values[k] - 0.94) < 4.0 * found.standard_error[k] < 0.03
+        pose = found.forward(log.readings[62:], sl.Pose(places[62:], np.eye(3))).pose
+        errors.append(np.linalg.norm((pose.position - places[62:])[:, [0, 2]], axis=1))
+        # a user's own choice replaces the default
+        own = sl.calibrate(
+            drawn, log.rows(slice(0, 62)), ["default", sl.Unknown("length_scale", deviation=0.1)], model=model, folds=0
+        )
+        assert own.parameters.names.count("length_scale") == 4
+    # as without an error of the scale: 2.4 mm, and 3.0 mm if mass, center of mass and stiffness are estimated too
+    assert np.sqrt(np.mean(np.square(errors))) < (2.8e-3 if model is STRAIGHT else 3.2e-3)
+
+
 def test_self_calibration_from_lengths_alone() -> None:
     """27 poses of eight cables have two more lengths than motions each."""
     truth, _, log = cables_log(1, 27)

@@ -76,7 +76,9 @@ def calibrate(
         unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s. "default"
             means frame anchors, length zeros, axial stiffness, mass and center of mass and, if they are read, gains and
             biases of load cells, zeros of swivel angles, and the inertia for natural frequencies; for straight cables,
-            frame anchors and length zeros. None is the same as "default" alone. With "clock_offset", the time by which
+            frame anchors and length zeros. In logs with measured positions and lengths, but without counts and load
+            cells, it also means one scale of the lengths. Unknowns that are named too replace those of "default". None
+            is the same as "default" alone. With "clock_offset", the time by which
             lengths are late, moving rows with a measured pose are also used, without their load cells.
         model: Cable model, exact, without weight, or straight. With straight cables, poses are fitted to the lengths
             and to measured poses without a force balance. Load cells are not used, and rows in motion are used.
@@ -122,7 +124,9 @@ def calibrate(
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
     wanted = (DEFAULT,) if unknowns is None else unknowns
     straight = model.code == codes.STRAIGHT
-    named = [one.name for one in checked_unknowns(wanted, log.sensors, straight=straight)]  # before any other work
+    counted_log = log.counts is not None
+    # before any other work
+    named = [one.name for one in checked_unknowns(wanted, log.sensors, counted=counted_log, straight=straight)]
     timed = "clock_offset" in named
     _refuse(diagnostics.wrong_units(robot, log))
     usable, motion = moving_rows(robot, log) if timed or straight else (None, None)
@@ -135,8 +139,8 @@ def calibrate(
     if straight and fit_log.rotation is None:
         log, fit_log = _with_assumed_rotations(robot, model, log, fit_log, wanted)
     sensors = active_sensors(fit_log)
-    asked = _with_relative_lengths(log, checked_unknowns(wanted, sensors, straight=straight))
-    parameters = parameters_of(robot, asked, sensors, counted=log.counts is not None)
+    asked = _with_relative_lengths(log, checked_unknowns(wanted, sensors, counted=counted_log, straight=straight))
+    parameters = parameters_of(robot, asked, sensors, counted=counted_log)
     more = fit_log.readings.size - len(fit_log) * len(robot.freedom) if straight else 0
     _check_count(fit_log, parameters, left_out, more, freely=DEFAULT not in wanted)
     moved = None if motion is None or not motion.any() else motion[:, rows]
@@ -223,8 +227,9 @@ def _with_assumed_rotations(
     robot: Robot, model: CableModel, log: WinchLog, fit_log: WinchLog, unknowns: Sequence[str | Unknown]
 ) -> tuple[WinchLog, WinchLog]:
     """The logs, with rotations as commanded, or level, if neither lengths nor positions determine the rotations."""
-    asked = checked_unknowns(unknowns, log.sensors, straight=True)
-    parameters = parameters_of(robot, _with_relative_lengths(log, asked), log.sensors, counted=log.counts is not None)
+    counted_log = log.counts is not None
+    asked = checked_unknowns(unknowns, log.sensors, counted=counted_log, straight=True)
+    parameters = parameters_of(robot, _with_relative_lengths(log, asked), log.sensors, counted=counted_log)
     problem = FitProblem(robot, model, log.sensors, parameters, ReadingsTable.of(fit_log))
     state = start_of(problem, fit_log.commanded)
     readings = problem.readings(problem.reported_lengths(state.machine), slice(None))

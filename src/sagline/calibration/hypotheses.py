@@ -31,6 +31,7 @@ _WIDE: Final = {
     "platform_anchors": 0.05,
     "length_zero": 0.5,
     "drum_radius": 0.03,
+    "length_scale": 0.05,  # one value for all cables
     "axial_stiffness": 0.5,
     "linear_density": 0.5,
     "mass": 0.2,
@@ -149,7 +150,11 @@ class Trial:
         given = given._replace(**{"counts" if counted else "lengths": read})
         if change.tilt:
             given = given._replace(rotations=_changed_tilt(given.rotations, TILTS[change.tilt]))
-        wide = [Unknown(name, deviation=width) for name, width in _WIDE.items() if self._has(name, counted)]
+        wide = [
+            Unknown(name, shared=True if name == "length_scale" else None, deviation=width)
+            for name, width in _WIDE.items()
+            if self._has(name, counted)
+        ]
         parameters = parameters_of(self.robot, wide, sensors, counted=counted)
         problem = FitProblem(self.robot, self.model, sensors, parameters, given)
         poses = self._poses(problem, change, most) if log.commanded is None else log.commanded[rows]
@@ -176,6 +181,8 @@ class Trial:
         """True if the robot has the parameter `name`."""
         if name == "drum_radius":
             return counted
+        if name == "length_scale":
+            return not counted and self.log.position is not None
         return name != "linear_density" or bool((self.robot.cables.linear_density > 0.0).all())
 
     def _counts_of_length(self) -> Array:

@@ -70,7 +70,7 @@ KINDS: Final[dict[str, Kind]] = {
     "center_of_mass": Kind("robot", "m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
     "inertia": Kind("system", "", kinds.INERTIA, _XYZ, False, False, False, 0.2, 1.0, "frequencies"),
     "measuring_frame": Kind("system", "m", kinds.SHIFT, _SIX, False, False, False, 10.0, 10.0, "positions"),
-    "length_scale": Kind("system", "", kinds.SCALE, _ONE, True, False, False, 0.02, 0.1, "lengths"),
+    "length_scale": Kind("system", "", kinds.SCALE, _ONE, True, False, False, 0.05, 0.1, "lengths"),
     "clock_offset": Kind("system", "s", kinds.CLOCK, _ONE, True, True, False, 0.1, 1.0, "motion"),
     "swivel_zero": Kind("system", "rad", kinds.SWIVEL, _ONE, True, False, False, np.pi, np.pi, "swivel angles"),
     "target": Kind("system", "m", kinds.TARGET, _XYZ, False, False, False, 0.1, 1.0, "positions"),
@@ -196,13 +196,16 @@ OF_FORCES: Final = ("axial_stiffness", "linear_density", "mass", "center_of_mass
 DEFAULT: Final = "default"  # in a list of unknowns, it means the default unknowns
 
 
-def _default_unknowns(sensors: Sensors, *, straight: bool) -> tuple[str, ...]:
+def _default_unknowns(sensors: Sensors, *, counted: bool, straight: bool) -> tuple[str | Unknown, ...]:
     """Default unknowns, with those of further readings if `sensors` has them; `straight`: no forces."""
-    if straight:
-        return UNKNOWNS[:2]
     cells = () if sensors.tension_deviation is None else OF_CELLS
+    # measured positions determine the scale of reported lengths; load cells without them do not
+    scaled = sensors.position_deviation is not None and not (counted or cells)
+    scale = (Unknown("length_scale", shared=True),) if scaled else ()
+    if straight:
+        return (*UNKNOWNS[:2], *scale)
     further = [("swivel_zero", sensors.swivel_deviation), ("inertia", sensors.frequency_deviation)]
-    return (*UNKNOWNS, *cells, *(name for name, deviation in further if deviation is not None))
+    return (*UNKNOWNS, *cells, *(name for name, deviation in further if deviation is not None), *scale)
 
 
 _NOTHING: Final = {"dead_cable": "0 m", "pulley_radius": "0 m"}
@@ -214,7 +217,7 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
     m = robot.cable_count
     where = np.full((kinds.KIND_ROWS, m), -1, dtype=np.int64)
     rows: list[tuple[str, str, str, int, float, float, bool, bool]] = []
-    for unknown in checked_unknowns(unknowns, sensors):
+    for unknown in checked_unknowns(unknowns, sensors, counted=counted):
         kind = KINDS[unknown.name]
         _refuse_unobserved(robot, sensors, unknown, kind, counted)
         own = _value(robot, sensors, unknown.name, counted)
@@ -233,14 +236,22 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
     return Parameters(names, labels, units, cables, locked(where), priors, deviations, flags, logarithmic, counted)
 
 
-def checked_unknowns(unknowns: Sequence[str | Unknown], sensors: Sensors, *, straight: bool = False) -> list[Unknown]:
-    """Checked list of unknowns without repetitions; "default" is replaced by the default unknowns."""
+def _unknown(item: str | Unknown) -> Unknown:
+    return Unknown(item) if isinstance(item, str) else instance(item, Unknown, "unknown")
+
+
+def checked_unknowns(
+    unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool, straight: bool = False
+) -> list[Unknown]:
+    """Checked list of unknowns without repetitions; "default" means the default unknowns that are not named too."""
     given = elements(unknowns, str | Unknown, "unknowns", 'Give ("frame_anchors", "mass"), for example.')
     if not given:
         raise InvalidValueError("unknowns", "none", "at least one", f"Name some of {', '.join(KINDS)}.")
-    default = _default_unknowns(sensors, straight=straight)
-    items = [one for item in given for one in (default if isinstance(item, str) and item == DEFAULT else (item,))]
-    found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
+    default = [_unknown(one) for one in _default_unknowns(sensors, counted=counted, straight=straight)]
+    items = [DEFAULT if isinstance(item, str) and item == DEFAULT else _unknown(item) for item in given]
+    named = {item.name for item in items if isinstance(item, Unknown)}
+    others = [one for one in default if one.name not in named]
+    found = [one for item in items for one in ((item,) if isinstance(item, Unknown) else others)]
     names = [one.name for one in found]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Name every unknown once.")
