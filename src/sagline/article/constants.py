@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from sagline.article import regressions as fits
-from sagline.article.drawing import Drawing, axes, chapter, finding, shades
+from sagline.article.drawing import axes, chapter, finding, shades
 from sagline.cables.model import CableState
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -231,8 +231,8 @@ def _tension(study: fits.SagStudy) -> Finding:
     ax.set_xscale("log")
     ax.set_yscale("log")
     d, a_d = (values[MIDDLE, PICKED, DENSE] for values in (study.adjusting_length, study.a_d))
-    fits = a_d[:, None] * tensions**-2
-    _draw_courses(ax, (tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")))
+    curves = a_d[:, None] * tensions**-2
+    _draw_courses(ax, (tensions, d, tensions, curves, _named(study.sampling.chords[[*PICKED]], "g")))
     share = study.adjusting_length / study.fitted_length
     numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
     return finding(
@@ -243,33 +243,27 @@ def _tension(study: fits.SagStudy) -> Finding:
 def _chord(study: fits.SagStudy) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, sampling.chords[-1], 80)
-    fits = study.q_a[:, DENSE, None] * fine**3
-    courses = sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g")
+    curves = study.q_a[:, DENSE, None] * fine**3
+    courses = sampling.chords, study.a_d[..., DENSE], fine, curves, _named(sampling.angles, "g")
     captions = (f"a_d {_middle_and_dense(study)} with its cubic (figure 11).", "The same at five angles (figure 12).")
-    away = _away(study.fitted_a_d, study.a_d)
-    return finding(
-        "a-over-chord",
-        numbers={"cubic_away_share": away},
-        panels=_course_panels(courses, ("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions),
-    )
+    numbers = {"cubic_away_share": _away(study.fitted_a_d, study.a_d)}
+    labels = "$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"
+    return _course_finding("a-over-chord", numbers, courses, labels, MIDDLE, captions)
 
 
 def _angle(study: fits.SagStudy) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, 0.5 * np.pi, 100)
-    fits = study.p_q[[*DRAWN], None] * np.cos(fine) ** 4
-    labels = _named(sampling.densities[[*DRAWN]], ".1f")
-    courses = sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels
+    curves = study.p_q[[*DRAWN], None] * np.cos(fine) ** 4
+    legend = _named(sampling.densities[[*DRAWN]], ".1f")
+    courses = sampling.angles, study.q_a[:, DRAWN].T, fine, curves, legend
     captions = (
         f"q_a at ρ = {n(sampling.densities[DENSE], unit='kg/m')} (figure 13).",
         "The same at five densities (figure 14).",
     )
-    away = _away(study.fitted_q_a, study.q_a)
-    return finding(
-        "q-over-angle",
-        numbers={"cos4_away_share": away},
-        panels=_course_panels(courses, (r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions),
-    )
+    numbers = {"cos4_away_share": _away(study.fitted_q_a, study.q_a)}
+    labels = r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"
+    return _course_finding("q-over-angle", numbers, courses, labels, DENSE, captions)
 
 
 def _density(study: fits.SagStudy) -> Finding:
@@ -306,22 +300,28 @@ _Courses: TypeAlias = tuple[Array, Array, Array, Array, list[str]]
 
 def _draw_courses(ax: Axes, courses: _Courses) -> None:
     """Draw the samples and fitted curves of all `courses`; the colors change from dark to light."""
-    x, rows, fine, fits, names = courses
-    for row, fit, name, color in zip(rows, fits, names, shades(len(names)), strict=True):
+    x, rows, fine, curves, names = courses
+    for row, fit, name, color in zip(rows, curves, names, shades(len(names)), strict=True):
         ax.plot(x, row, "o", color=color, markersize=2.6, label=name)
         ax.plot(fine, fit, color=color, linewidth=0.9)
 
 
-def _course_panels(
-    courses: _Courses, labels: tuple[str, str, str], one: int, captions: tuple[str, str]
-) -> tuple[Drawing, Drawing]:
-    """Two panels: the curve with the index `one`, and all curves; labels: label of x, label of y, title of legend."""
-    x, rows, fine, fits, _ = courses
+def _course_finding(
+    key: str,
+    numbers: dict[str, Any],
+    courses: _Courses,
+    labels: tuple[str, str, str],
+    one: int,
+    captions: tuple[str, str],
+) -> Finding:
+    """Finding with two panels: the curve with the index `one`, and all curves."""
+    # labels: label of x, label of y, title of the legend
+    x, rows, fine, curves, _ = courses
     figure, ax = axes(*labels[:2])
-    _with_fit(ax, x, rows[one], fine, fits[one])
+    _with_fit(ax, x, rows[one], fine, curves[one])
     second, bx = axes(*labels[:2])
     _draw_courses(bx, courses)
-    return (figure, captions[0]), (second, captions[1], labels[2])
+    return finding(key, numbers, panels=((figure, captions[0]), (second, captions[1], labels[2])))
 
 
 def _named(values: Iterable[float], form: str) -> list[str]:

@@ -24,6 +24,11 @@ TOO_LOOSE = 0.5  # largest relative standard error of a value that counts as det
 TOO_CLOSE = 0.95  # largest correlation of two values that count as separable
 ITERATIONS = 30  # largest number of iterations of the chord tension for a measured tension at an end
 WEIGHTINGS = 3  # number of computations of the weights, which depend slightly on the solution
+_BOUNDS = {  # of the solver's unknowns, wide enough for every rope: 1 mg/m to 1 t/m, and 1 N to 1 PN
+    "linear_density": (np.log(1e-6), np.log(1e3)),
+    "axial_stiffness": (0.0, np.log(1e15)),
+    "length_offset": (-np.inf, np.inf),
+}
 _ADVICE = {
     "linear_density": "measure at lower tensions or longer spans, to increase the sag",
     "axial_stiffness": "measure at higher tensions, to increase the stretch",
@@ -187,7 +192,7 @@ def _fit(
     # The solver's unknowns are logarithms of density and stiffness, which keep both positive, and the offset in mm.
     scale = np.array([1e-3 if name == "length_offset" else 1.0 for name in names])
     unknown = np.array([0.0 if name == "length_offset" else np.log(float(getattr(known, name))) for name in names])
-    spread = np.full(length.size, length_error)
+    spread, bounds = np.full(length.size, length_error), np.transpose([_BOUNDS[name] for name in names])
 
     def cable_of(x: Array) -> tuple[Cable, float]:
         given = dict(zip(names, x, strict=True))
@@ -199,7 +204,7 @@ def _fit(
         return length - offset - predicted(cable, tension)
 
     for _ in range(WEIGHTINGS):
-        found = least_squares(lambda x: residuals(x) / spread, unknown, x_scale="jac", bounds=_bounds(names))  # noqa: B023
+        found = least_squares(lambda x: residuals(x) / spread, unknown, x_scale="jac", bounds=bounds)  # noqa: B023
         unknown = found.x
         cable, offset = cable_of(unknown)
         higher, lower = (predicted(cable, f * tension) for f in (1.0 + 1e-4, 1.0 - 1e-4))
@@ -220,13 +225,6 @@ def _fit(
         residuals=locked(rest),
         chi_squared=float(np.sum((rest / spread) ** 2) / freedom),
     )
-
-
-def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-    """Bounds of the unknowns, wide enough for every rope: 1 mg/m to 1 t/m, and 1 N to 1 PN."""
-    low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
-    high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
-    return [low[name] for name in names], [high[name] for name in names]
 
 
 def _checked_start(start: Cable | None) -> Cable:

@@ -155,8 +155,6 @@ def _slices() -> Finding:
         "length-error-slices",
         numbers={"largest_error_mm": worst},
         panels=panels,
-        empirical=", ".join(f"{n(worst[q]['Empirical'], '.2g', 'mm')} over the {q}" for q in worst),
-        parabolic=", ".join(n(worst[q]["Parabolic"], ".2g", "mm") for q in worst),
     )
 
 

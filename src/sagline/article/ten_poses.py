@@ -52,6 +52,7 @@ def table2() -> Table2:
 
 HOME = (0.0, 0.0, 1.5)  # home position of the prototype [m]
 METHOD = sl.MinimumNorm("horizontal")
+MOST = 3  # largest number of parameters that explain the errors together
 TOUR_SPEED = 0.2  # assumed speed [m/s]; the article states "low speed"
 
 
@@ -88,7 +89,7 @@ class TenPoses:
         return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
 
 
-def ten_poses(most: int = 3) -> TenPoses:
+def ten_poses() -> TenPoses:
     """Plan the prototype at the ten poses, and search for possible causes of the measured errors."""
     # The fits use exact cables and all sets of up to three parameters, within plausible limits. The remaining error is
     # at least 0.3 mm, because the printed positions are in whole millimeters.
@@ -100,9 +101,9 @@ def ten_poses(most: int = 3) -> TenPoses:
 
     nominal, dead, *off = error_of([{}, {causes.DEAD: 1.0}, *({one.name: one.typical} for one in causes.PARAMETERS)])
     found = sorted(
-        causes.explanations(error_of, table.error, causes.subsets(causes.PARAMETERS, most)), key=lambda one: one.rms
+        causes.explanations(error_of, table.error, causes.subsets(causes.PARAMETERS, MOST)), key=lambda one: one.rms
     )
-    ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(most))
+    ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(MOST))
     imitated, single_zero = _limits(robot, error_of, plan, ranked[1][0])
     return TenPoses(
         table=table,

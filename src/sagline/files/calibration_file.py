@@ -276,7 +276,6 @@ FORMAT: Final = Format(
     give="Give a .nc file of sagline calibrate, or of Calibration.save.",
     again="Save the calibration again, or get the original file.",
     key="sagline_calibration_format",
-    version=1,
     pack=_pack,
     unpack=_unpack,
 )

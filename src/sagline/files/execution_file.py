@@ -194,6 +194,5 @@ FORMAT: Final = Format(
     give="Give a .nc file of sagline log.",
     again="Write it again with sagline log.",
     key="sagline_execution_format",
-    version=1,
     pack=pack,
 )

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.control.execution import Execution
-from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array
 from sagline.files.variables import NONE, SOMEWHERE, Quantity
@@ -186,16 +185,6 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
             part = [{"name": name, "index": index, "value": value} for index, value in pairs if value is not None]
             known[PARTIAL] = known.get(PARTIAL, []) + part
         yield message_of(known)
-
-
-def event_of(text: bytes) -> Event:
-    """Read the event of a message; raise ValueError if the message is not an event."""
-    try:
-        said = json.loads(text)
-        kind, state = EventKind(said["kind"]), State[said["state"]]
-        return Event(float(said["time"]), int(said["cycle"]), kind, str(said["name"]), state, str(said["text"]))
-    except (KeyError, TypeError) as error:
-        raise ValueError(f"no event ({error})") from None
 
 
 def _json_values(values: NDArray[Any]) -> list[Any]:

@@ -15,10 +15,11 @@ from typing import Any, Final, NamedTuple
 
 from numpy.typing import NDArray
 
-from sagline.control.recording import Event
+from sagline.control.recording import Event, EventKind
+from sagline.control.states import State
 from sagline.core.arguments import check_memory, file_path
 from sagline.core.errors import FileError
-from sagline.files.mcap_layout import END, EVENT, EVERY, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
+from sagline.files.mcap_layout import END, EVENT, EVERY, FORMAT, HEAD, PLAN, RECORD, TRUTH
 from sagline.files.mcap_writer import check_packages
 from sagline.files.netcdf import check_version
 from sagline.files.packed import unpack
@@ -199,13 +200,23 @@ class LogReader:
             if lacking := _NEEDED - block.keys():
                 raise FileError(self.log.path, f"is inconsistent (no {min(lacking)})", AGAIN)
         elif topic == EVENT:
-            log.events.append(event_of(data))
+            log.events.append(_event_of(data))
         elif topic == TRUTH:
             said = json.loads(data)
             log.truth.append(Truth(stamp, float(said["time"]), said["position"], said["quaternion"]))
 
     def _damaged(self) -> FileError:
         return FileError(self.log.path, f"is damaged at byte {self._offset:,}", AGAIN)
+
+
+def _event_of(text: bytes) -> Event:
+    """Read the event of a message; raise ValueError if the message is not an event."""
+    try:
+        said = json.loads(text)
+        kind, state = EventKind(said["kind"]), State[said["state"]]
+        return Event(float(said["time"]), int(said["cycle"]), kind, str(said["name"]), state, str(said["text"]))
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"no event ({error})") from None
 
 
 def _content_of(chunk: Any) -> bytes:

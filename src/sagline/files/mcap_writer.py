@@ -187,19 +187,18 @@ class Recorder:
         robot: Robot,
         *,
         period: float = PERIOD,
-        group_count: int | None = None,
         epoch: int | None = None,
         stream: RawIOBase | None = None,
     ) -> None:
         """Open the file and start the thread."""
         # file: for example "run.mcap"; an existing regular file is replaced, any other target is refused. robot: the
-        # robot used by the controller. period: period of a cycle [s]. group_count: number of groups G; None: two
-        # winches per group. epoch: time of the log minus time of the link's clock [ns]; None: the log starts at the
-        # current date and time. stream: unbuffered output that is used instead of the file
+        # robot used by the controller. period: period of a cycle [s]. epoch: time of the log minus time of the link's
+        # clock [ns]; None: the log starts at the current date and time. stream: unbuffered output that is used instead
+        # of the file
         self.file = check_file(file_path(file))
         check_packages()
         self._robot, self._period = instance(robot, Robot, "robot"), period
-        self._groups = len(groups_of(robot.cable_count)) if group_count is None else group_count
+        self._groups = len(groups_of(robot.cable_count))
         self._plan, self._zero = NONE, np.zeros(robot.cable_count)
         self._degraded: list[bool] = []
         self._tape = self._blank()

@@ -89,7 +89,7 @@ class Format(Generic[T]):
     give: str  # next step for the user: "Give the .nc file that sagline track wrote."
     again: str  # next step for a damaged file
     key: str  # attribute that holds the version of the format
-    version: int  # newest version of the format; incremented with changes that an older sagline could misread
+    version: int = 1  # newest version of the format; incremented with changes that an older sagline could misread
     # `pack` creates the data set of a result, and `unpack` creates the result from a path for messages and a data set;
     # None if another module does this, or if files are only written
     pack: Callable[[T], Dataset] | None = None
@@ -245,14 +245,6 @@ def _cause(path: Path, content: Format[Any]) -> tuple[str, str]:
         return reason, content.again
     kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
     return f"is {kind}, not a {content.made}", content.give
-
-
-def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
-    """Numeric attributes of `source`. An attribute with the unit follows each attribute whose unit is not None."""
-    found: dict[str, Any] = {}
-    for name, unit in units.items():
-        found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
-    return found
 
 
 def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:

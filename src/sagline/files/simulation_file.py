@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +18,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.vibration import VibrationStatus
 from sagline.files import variables as v
-from sagline.files.netcdf import Format, attributes_with_units, index_coordinate, robot_of
+from sagline.files.netcdf import Format, index_coordinate, robot_of
 from sagline.files.variables import NONE, SOMEWHERE, STEP, Quantity
 from sagline.robot.pose import Pose
 
@@ -201,6 +202,14 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
     return FORMAT.load(file)
 
 
+def _attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
+    """Numeric attributes of `source`. An attribute with the unit follows each attribute whose unit is not None."""
+    found: dict[str, Any] = {}
+    for name, unit in units.items():
+        found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
+    return found
+
+
 def _pack(simulation: Simulation) -> Dataset:
     """Create the data set of a simulation. Dimensions: time, cable and event; for cables with mass, node."""
     variables = v.variables_of_result(simulation, (*SAMPLES, NODES), (ROWS,)) | v.variables_of_result(
@@ -216,11 +225,11 @@ def _pack(simulation: Simulation) -> Dataset:
     attributes = {
         "cable_mass": simulation.cable_mass,
         "integrator": simulation.integrator,
-        **attributes_with_units(simulation, {"step": "s"}),
-        **({"winches": LAGGING, **attributes_with_units(winches, LAG)} if lagging else {"winches": winches}),
+        **_attributes_with_units(simulation, {"step": "s"}),
+        **({"winches": LAGGING, **_attributes_with_units(winches, LAG)} if lagging else {"winches": winches}),
         "winding": simulation.winding,
         FORMAT.key: FORMAT.version - (simulation.anchors is None),
-        **attributes_with_units(instance(simulation.damping, Damping, "damping"), LOSSES),
+        **_attributes_with_units(instance(simulation.damping, Damping, "damping"), LOSSES),
     }
     robot = simulation.robot
     data = FORMAT.dataset(f"Motion of {robot.name} in time", robot, attributes, variables, coordinates)
@@ -277,8 +286,8 @@ FREQUENCIES: Final = (
 
 
 def _pack_frequencies(found: FrequencyMap) -> Dataset:
-    attributes = attributes_with_units(found, {"up_to": "Hz"})
-    attributes |= attributes_with_units(
+    attributes = _attributes_with_units(found, {"up_to": "Hz"})
+    attributes |= _attributes_with_units(
         found.damping, {"loss_time": "s", "air_damping": "N s/m2", "modal_damping": None}
     )
     variables = v.variables_of_result(found, FREQUENCIES, ("pose",))
@@ -292,6 +301,5 @@ FREQUENCY_MAP: Final = Format(
     give="Give a .nc file that the save method of a map wrote.",
     again="Make the map again, or get the original file.",
     key="sagline_frequency_map_format",
-    version=1,
     pack=_pack_frequencies,
 )

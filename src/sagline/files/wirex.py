@@ -257,11 +257,9 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
 
 
 def _lost(root: Element) -> tuple[str, ...]:
-    lost = []
-    if any(element.get("damping") for element in root.findall("cable")):
-        lost.append("The cables' damping, cost and largest length.")
-    if root.find("robot/controller") is not None:
-        lost.append("The controller.")
-    if root.find("robot/application") is not None:
-        lost.append("The application: its load and its limits of the cables' forces.")
-    return tuple(lost)
+    lost = {
+        "The cables' damping, cost and largest length.": any(cable.get("damping") for cable in root.findall("cable")),
+        "The controller.": root.find("robot/controller") is not None,
+        "The application: its load and its limits of the cables' forces.": root.find("robot/application") is not None,
+    }
+    return tuple(text for text, there in lost.items() if there)

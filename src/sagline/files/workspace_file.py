@@ -271,7 +271,6 @@ FORMAT: Final = Format(
     give="Give a .nc file of sagline workspace, or of Workspace.save.",
     again="Save the workspace again, or get the original file.",
     key="sagline_workspace_format",
-    version=1,
     pack=_pack,
     unpack=_unpack,
 )

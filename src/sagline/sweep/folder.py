@@ -42,7 +42,6 @@ FORMAT: Final = Format(
     give="Give a folder that sagline sweep has written.",
     again="Sweep again, into another folder.",
     key="sagline_sweep_format",
-    version=1,
 )
 DIMENSIONS: Final = ("robot", "pose", "wrench")
 GROUP: Final = "numbers.zarr"  # name of the request in the folder

@@ -308,18 +308,20 @@ def _robots(given: Any, folder: Path) -> list[Robot]:
         if not isinstance(name, str) or not name.strip():
             step = f"Give a preset ({', '.join(robot_names()[:3])}, ...) or a robot file."
             raise InvalidValueError(f"robots[{k}]", brief(name), "the name of a robot, or its file", step)
-    return [load_robot(name if name in robot_names() else _beside(name, folder)) for name in names]
+    # the path of a robot file is relative to the folder of the sweep file
+    files = (name not in robot_names() and Path(name).suffix.lower() in (".yaml", ".yml") for name in names)
+    return [load_robot(folder / name if is_file else name) for name, is_file in zip(names, files, strict=True)]
 
 
-def _beside(name: str, folder: Path) -> str | Path:
-    """Path of a robot file, relative to the folder of the sweep file; the name of a preset is returned unchanged."""
-    return folder / name if Path(name).suffix.lower() in (".yaml", ".yml") else name
+def _check_one_of(given: YamlEntry, item: str, allowed: str, step: str) -> None:
+    """Refuse an entry in which not exactly one of its two keys is given."""
+    found = [name for name, value in given if value is not None]
+    if len(found) != 1:
+        raise InvalidValueError(item, f"given by {' and '.join(found)}" if found else "not given", allowed, step)
 
 
 def _poses(given: _Poses, folder: Path) -> Pose:
-    if (given.grid is None) == (given.path is None):
-        both = "given by grid and path" if given.grid is not None else "not given"
-        raise InvalidValueError("poses", both, "a grid, or a path", "Give one of the two.")
+    _check_one_of(given, "poses", "a grid, or a path", "Give one of the two.")
     if given.path is not None:
         from sagline.files.path_file import load_path
 
@@ -332,9 +334,7 @@ def _poses(given: _Poses, folder: Path) -> Pose:
 def _wrenches(given: _Wrenches | None) -> Array | None:
     if given is None:
         return None
-    if (given.grid is None) == (given.rows is None):
-        both = "given by grid and rows" if given.grid is not None else "not given"
-        raise InvalidValueError("wrenches", both, "a grid, or rows", "Give one of the two, or leave wrenches out.")
+    _check_one_of(given, "wrenches", "a grid, or rows", "Give one of the two, or leave wrenches out.")
     if given.grid is not None:
         return _product(given.grid, "wrenches.grid.")
     units = _Loads.units()

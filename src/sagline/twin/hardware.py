@@ -160,12 +160,8 @@ def _rest_at(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
 
 def _zero_errors(true: Robot, nominal: Robot) -> Array:
     """Zero errors of the encoders [m], (m,): true length off the drum minus the length from the counts."""
-    error = np.zeros(true.cable_count)
-    if true.winches is not None and nominal.winches is not None:
-        there, thought = true.winches.length_zero, nominal.winches.length_zero
-        if there is not None and thought is not None:
-            error = there - thought
-    return error
+    there, thought = (None if robot.winches is None else robot.winches.length_zero for robot in (true, nominal))
+    return np.zeros(true.cable_count) if there is None or thought is None else there - thought
 
 
 def _routed_length(robot: Robot, pose: Pose) -> Array:

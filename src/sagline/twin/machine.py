@@ -127,11 +127,9 @@ class Machine:
 
     def _make_programs(self, limits: PlcLimits) -> list[Program]:
         """Programs of the PLCs, each with the limits of its own winches."""
-        programs, length = [], self._hardware.read[LENGTH].tolist()
-        for part in self._parts:
-            program = Program(PlcLimits(*(column[part] for column in limits)), self.period)
-            program.length = length[part]
-            programs.append(program)
+        programs = [Program(PlcLimits(*(column[part] for column in limits)), self.period) for part in self._parts]
+        for program, part in zip(programs, self._parts, strict=True):
+            program.length = self._hardware.read[LENGTH, part].tolist()
         return programs
 
     @property
