@@ -19,7 +19,7 @@ WIDTH, HEIGHT = "platform anchors, outward", "platform anchors, up and down"
 Errors: TypeAlias = Mapping[str, float]  # parameter name: error in the unit of the parameter; a missing error is zero
 
 
-class Parameter(NamedTuple):
+class _Parameter(NamedTuple):
     """Parameter of the prototype that may differ from Table 1, with the same error for all cables."""
 
     name: str
@@ -30,16 +30,16 @@ class Parameter(NamedTuple):
 
 
 PARAMETERS = (
-    Parameter(MODULUS, "%", 20.0, 50.0),
-    Parameter(DENSITY, "%", 20.0, 30.0),
-    Parameter(LOAD, "kg", -2.0, 5.0),
-    Parameter(ANCHORS, "mm", 20.0, 50.0),
-    Parameter(DRUM, "%", -1.0, 3.0),
-    Parameter(ZERO, "mm", -10.0, 50.0),
-    Parameter(PULLEY, "mm", 30.0, 60.0, positive=True),
-    Parameter(DEAD, "m", 0.2, 4.0, positive=True),
-    Parameter(WIDTH, "mm", 10.0, 20.0),
-    Parameter(HEIGHT, "mm", 10.0, 20.0),
+    _Parameter(MODULUS, "%", 20.0, 50.0),
+    _Parameter(DENSITY, "%", 20.0, 30.0),
+    _Parameter(LOAD, "kg", -2.0, 5.0),
+    _Parameter(ANCHORS, "mm", 20.0, 50.0),
+    _Parameter(DRUM, "%", -1.0, 3.0),
+    _Parameter(ZERO, "mm", -10.0, 50.0),
+    _Parameter(PULLEY, "mm", 30.0, 60.0, positive=True),
+    _Parameter(DEAD, "m", 0.2, 4.0, positive=True),
+    _Parameter(WIDTH, "mm", 10.0, 20.0),
+    _Parameter(HEIGHT, "mm", 10.0, 20.0),
 )
 
 
@@ -106,7 +106,7 @@ ITERATIONS = 20
 CONVERGED = 1e-5  # largest motion of the platform [m] in the last step of a converged fit; Table 2 is in millimeters
 NEAR = 1e-3  # largest distance from a limit, relative to the upper limit, of a value that counts as at the limit
 
-Model: TypeAlias = tuple[Parameter, ...]
+Model: TypeAlias = tuple[_Parameter, ...]
 ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # gives actual minus desired positions [m], (K, N, 3)
 
 
@@ -164,7 +164,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
     return tuple(_explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))
 
 
-def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
+def subsets(parameters: Sequence[_Parameter], most: int) -> list[Model]:
     """All sets of one to `most` parameters, each of which is a model."""
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
@@ -174,7 +174,7 @@ def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]
     # near an upper limit, the step of the finite difference is negative
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
-        high = limits(model)[1]
+        high = _limits(model)[1]
         step = np.where(x > (1.0 - STEP) * high, -STEP, STEP) * high
         points.append(np.vstack((x, x + np.diag(step))))
         steps.append(step)
@@ -184,7 +184,7 @@ def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]
     return [(part[0], ((part[1:] - part[0]) / step[:, None]).T) for part, step in zip(parts, steps, strict=True)]
 
 
-def limits(model: Model) -> tuple[Array, Array]:
+def _limits(model: Model) -> tuple[Array, Array]:
     """Lower and upper limits of the plausible errors of a model's parameters in their units, shape (k,)."""
     high = np.array([parameter.plausible for parameter in model])
     return np.where([parameter.positive for parameter in model], 0.0, -high), high
@@ -194,7 +194,7 @@ def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
     """Least-squares solution within the limits; the solver's unknowns are errors divided by their upper limits."""
     from scipy.optimize import lsq_linear
 
-    low, high = limits(model)
+    low, high = _limits(model)
     return np.asarray(high * lsq_linear(slopes * high, right, bounds=(low / high, np.ones_like(high)), method="bvls").x)
 
 
@@ -226,7 +226,7 @@ def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple
 def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, measured: Array) -> Explanation:
     rest = measured - predicted
     rms = float(np.sqrt(np.mean(rest**2)))
-    low, high = limits(model)
+    low, high = _limits(model)
     at_limit = (values >= (1.0 - NEAR) * high) | (values <= low + NEAR * high)
     return Explanation(
         parameters=model,

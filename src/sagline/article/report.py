@@ -71,7 +71,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
     return ArticleReport(*write_page(folder, NAMES, text, numbers), tuple(chapters), numbers)
 
 
-class ReportPart(NamedTuple):
+class _ReportPart(NamedTuple):
     """A chapter of the report that a user can select."""
 
     key: str  # name of the chapter
@@ -87,23 +87,23 @@ class ReportPart(NamedTuple):
 
 
 PARTS = (
-    ReportPart("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
-    ReportPart("intercept", (6, 7), (), "constants", "intercept_chapter"),
-    ReportPart("sag", tuple(range(8, 16)), (), "constants", "sag_chapter"),
-    ReportPart("constants", (), (), "constants", "constants_chapter"),
-    ReportPart("identify", (), (), "identification", "identify_chapter"),
-    ReportPart("models", (), (), "models", "models_chapter"),
-    ReportPart("simulation", tuple(range(17, 23)), (), "simulation", "simulation_chapter"),
-    ReportPart("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
-    ReportPart("workspace", (), (), "workspace", "workspace_chapter"),
-    ReportPart("errata", (), (), "errata", "errata_chapter"),
+    _ReportPart("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
+    _ReportPart("intercept", (6, 7), (), "constants", "intercept_chapter"),
+    _ReportPart("sag", tuple(range(8, 16)), (), "constants", "sag_chapter"),
+    _ReportPart("constants", (), (), "constants", "constants_chapter"),
+    _ReportPart("identify", (), (), "identification", "identify_chapter"),
+    _ReportPart("models", (), (), "models", "models_chapter"),
+    _ReportPart("simulation", tuple(range(17, 23)), (), "simulation", "simulation_chapter"),
+    _ReportPart("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
+    _ReportPart("workspace", (), (), "workspace", "workspace_chapter"),
+    _ReportPart("errata", (), (), "errata", "errata_chapter"),
 )
 
 
 Wanted = set[str | tuple[str, int]]  # keys of whole chapters; figures and tables, such as ("figures", 6)
 
 
-def selection(words: Sequence[str]) -> tuple[list[ReportPart], Wanted]:
+def selection(words: Sequence[str]) -> tuple[list[_ReportPart], Wanted]:
     """Chapters with a finding that the command's arguments `words` select, and the selection; default: everything."""
     wanted: Wanted = set() if words else {part.key for part in PARTS}
     kind, open_word = "figures", ""
@@ -123,7 +123,7 @@ def selection(words: Sequence[str]) -> tuple[list[ReportPart], Wanted]:
     return [part for part in PARTS if part.key in wanted or wanted & _numbers_of(part)], wanted
 
 
-def _numbers_of(part: ReportPart | Finding) -> Wanted:
+def _numbers_of(part: _ReportPart | Finding) -> Wanted:
     """Figures and tables of a chapter or of a finding."""
     return {(kind, number) for kind in ("figures", "tables") for number in getattr(part, kind)}
 

@@ -35,7 +35,7 @@ METHOD = sl.MinimumNorm("horizontal")
 ERROR_BAND = 6e-3  # [m], the article's "(-6, 6) mm"
 
 
-class Figures(NamedTuple):
+class _Figures(NamedTuple):
     """Summary of one robot along the path with one model; only feasible poses count."""
 
     error_max: float  # largest distance of the platform from the planned position [m]
@@ -88,7 +88,7 @@ def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) ->
     return PathStudy(path, tuple(models), suspended, mixed)
 
 
-def low_tension_study(limits: Array, rate: float = 10.0) -> tuple[Array, list[Figures]]:
+def low_tension_study(limits: Array, rate: float = 10.0) -> tuple[Array, list[_Figures]]:
     """Largest errors (2, k) [m] along any axis of two robots with k lower tension limits; results for bound (54)."""
     # Both robots are planned with the empirical model. Cables may become slack. The bound (54) has T_adj = 0.
     path, robots = sl.article_path(rate), [sl.load_robot(name) for name in ROBOTS]
@@ -102,15 +102,15 @@ def low_tension_study(limits: Array, rate: float = 10.0) -> tuple[Array, list[Fi
     ]
 
 
-def figures(run: sl.Confirmation) -> Figures:
+def figures(run: sl.Confirmation) -> _Figures:
     """Summary of the errors, tensions and lengths of one robot along the path."""
     plan, good = run.plan, np.atleast_1d(run.plan.feasible & run.held)
     if not good.any():
-        return Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)
+        return _Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)
     cables, error = plan.state.cables, run.position_error[good]
     distance = np.linalg.norm(error, axis=1)
     tension = plan.horizontal_tension
-    return Figures(
+    return _Figures(
         error_max=float(distance.max()),
         error_mean=float(distance.mean()),
         axis_error_max=float(np.abs(error).max()),

@@ -42,7 +42,7 @@ class ActiveState(ABC):
 
     def fail(self, line: str) -> ActiveState:
         """Return the next state after a fault that stops the motion."""
-        return Stopping(self, State.FAULT, ExecutionStatus.FAULT, line)
+        return _Stopping(self, State.FAULT, ExecutionStatus.FAULT, line)
 
     def rest(self, mode: Mode, *, enabled: bool) -> None:
         """Command the drives to rest."""
@@ -232,7 +232,7 @@ class HomingState(ActiveState):
 
     def stop(self) -> ActiveState:
         """Change to STOPPING, which ends in READY."""
-        return Stopping(self, State.READY, ExecutionStatus.STOPPED, "the operator stopped")
+        return _Stopping(self, State.READY, ExecutionStatus.STOPPED, "the operator stopped")
 
 
 class Following(ActiveState):
@@ -268,13 +268,13 @@ class Following(ActiveState):
         """Change to STOPPING, which ends in IDLE."""
         if self.context.state is State.IDLE:
             return self
-        return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, "the operator stopped")
+        return _Stopping(self, State.IDLE, ExecutionStatus.STOPPED, "the operator stopped")
 
     def _finish(self, point: SetPoint) -> ActiveState:
         """Return the next state after the last set point was sent."""
         c, source = self.context, self.source
         if isinstance(source, PlatformJog) and source.failed and source.stops_hard:
-            return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, source.failed)
+            return _Stopping(self, State.IDLE, ExecutionStatus.STOPPED, source.failed)
         if isinstance(source, Along) and source.motion.plan is not None:
             if source.at_end:
                 c.end_run(ExecutionStatus.DONE, "the end of the plan")
@@ -284,10 +284,10 @@ class Following(ActiveState):
                 c.run.paused = source
             return Following(c, State.IDLE, c.run.reason, point, Standing(point, source.pose))
         after = self.settle(point.length, ExecutionStatus.DONE, "the jog ended")
-        return after or Stopping(self, State.FAULT, ExecutionStatus.FAULT, POSE_LOST)
+        return after or _Stopping(self, State.FAULT, ExecutionStatus.FAULT, POSE_LOST)
 
 
-class Stopping(ActiveState):
+class _Stopping(ActiveState):
     """STOPPING: a ramp that begins at the last set point that was sent. All rates reach zero at the same time."""
 
     def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:

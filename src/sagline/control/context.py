@@ -71,24 +71,6 @@ class _Estimator:
         return status if lost else None
 
 
-class _Garbage:
-    """Switch for garbage collection, which is off during motion because it can take longer than a cycle."""
-
-    def __init__(self) -> None:
-        self._stopped = False
-
-    def stop(self) -> None:
-        if not self._stopped and gc.isenabled():
-            self._stopped = True
-            gc.disable()
-
-    def go_on(self) -> None:
-        """Switch collection on again, if it was on before `stop`."""
-        if self._stopped:
-            self._stopped = False
-            gc.enable()
-
-
 class _Run:
     """The present motion with its record; if the robot is at rest, the last motion."""
 
@@ -139,7 +121,7 @@ class Context:
         self.sender = Sender(m, self.random)
         self.estimator = _Estimator(robot, self.model)
         self.journal = Journal(record)
-        self.garbage = _Garbage()
+        self._uncollected = False  # True while a motion has switched garbage collection off
         self.state = State.OFF
         self.sample: Sample | None = None  # newest sample; None before the first
         # zero: offset from homing, added to lengths of samples [m], shape (m,)
@@ -249,12 +231,20 @@ class Context:
         """Record cycles from this cycle on, and disable garbage collection."""
         run = self.run
         run.recording, run.status, run.reason = True, ExecutionStatus.RUNNING, ExecutionStatus.RUNNING.text
-        self.garbage.stop()
+        if gc.isenabled():  # it can take longer than a cycle
+            self._uncollected = True
+            gc.disable()
+
+    def collect_garbage(self) -> None:
+        """Enable garbage collection again, if a motion has disabled it."""
+        if self._uncollected:
+            self._uncollected = False
+            gc.enable()
 
     def end_run(self, status: ExecutionStatus, reason: str) -> None:
         """End the record of the motion with its final status, and enable garbage collection again."""
         self.run.status, self.run.reason = status, reason
-        self.garbage.go_on()
+        self.collect_garbage()
 
     def keep(self, cycle: Recorded) -> None:
         """Add a cycle to the table of the motion, and pass it to the recorder."""

@@ -81,7 +81,12 @@ class Evidence:
         known = winch is not None and winch.load_cell_range is not None
         # full_scale: full scale of the cells [N], infinite if unknown, shape (m,)
         self.full_scale = np.broadcast_to(winch.load_cell_range if known else np.inf, (m,))  # type: ignore[union-attr, arg-type]
-        self._set_up_motors(robot)
+        # ratios of cable tension to motor torque, if drum and gear are known
+        self._pull_of_torque: Array | None = None
+        self._friction = np.zeros(m)
+        if winch is not None and winch.drum_radius is not None:
+            self._pull_of_torque = np.broadcast_to(-np.abs(winch.gear) / winch.drum_radius, (m,))
+            self._friction = np.broadcast_to(winch.friction, (m,))
         self.believed: Flags = np.ones(m, dtype=bool)  # True for load cells whose readings are used, shape (m,)
         self.broken: Flags = np.zeros(m, dtype=bool)  # True for broken cables, shape (m,)
         self.jumped: Flags = np.zeros(m, dtype=bool)  # True for encoders that have jumped, shape (m,)
@@ -115,15 +120,6 @@ class Evidence:
         # faulted: True if a PLC reports a fault
         # tripped: True if a drive reports a fault
         self.faulted = self.tripped = False
-
-    def _set_up_motors(self, robot: Robot) -> None:
-        """Ratios of cable tension to motor torque, if drum and gear are known."""
-        winch, m = robot.winches, robot.cable_count
-        self._pull_of_torque: Array | None = None
-        self._friction = np.zeros(m)
-        if winch is not None and winch.drum_radius is not None:
-            self._pull_of_torque = np.broadcast_to(-np.abs(winch.gear) / winch.drum_radius, (m,))
-            self._friction = np.broadcast_to(winch.friction, (m,))
 
     def at(self, cycle: Cycle) -> None:
         """Update the evidence with a new cycle."""

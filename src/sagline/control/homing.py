@@ -72,7 +72,8 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
             yield np.full(robot.cable_count, math.inf)
             continue
         for axis in np.eye(3) if UNCERTAIN[name].axes else np.ones(1):
-            yield change(_varied(robot, name, _SHARE * error * axis))
+            value = value_of(robot, name)
+            yield change(robot if value is None else with_quantities(robot, {name: value + _SHARE * error * axis}))
 
 
 def _cell_sigma(robot: Robot) -> Array:
@@ -84,12 +85,6 @@ def _zeros(winches: Winch | None) -> Array:
     assert winches is not None
     assert winches.length_zero is not None
     return winches.length_zero
-
-
-def _varied(robot: Robot, name: str, change: Array) -> Robot:
-    """Copy of the robot in which `change` is added to the quantity `name`."""
-    value = value_of(robot, name)
-    return robot if value is None else with_quantities(robot, {name: value + change})
 
 
 WINDOW: Final = 50  # number of samples at rest whose mean is compared with the plan

@@ -95,7 +95,7 @@ class Loop:
     def _break_off(self, error: BaseException) -> None:
         """Command the PLCs to reduce the rates to zero by themselves, because perhaps no further cycle follows."""
         c = self.context
-        c.garbage.go_on()
+        c.collect_garbage()
         line = f"a cycle ended with {type(error).__name__}: {' '.join(str(error).split())[:160]}. The drives hold."
         c.say(EventKind.FAULT, "cycle broken off", line)
         if c.state is State.CONNECTING:

@@ -278,7 +278,7 @@ class Preparation:
                 while condition():
                     self.cycle()
         finally:
-            self._context.garbage.go_on()
+            self._context.collect_garbage()
 
     def _result_of(self, work: Callable[[], T]) -> T:
         """Result of long `work`. In real time, cycles continue meanwhile, because otherwise the PLCs would hold."""

@@ -99,7 +99,7 @@ class _Fade:
             return None
         share = self._cycle / self._cycles
         fall = _smooth_slope(share) / (self._cycles * self._period)
-        return (1.0 - smooth(share)) * self._lead, -fall * self._lead
+        return (1.0 - _smooth(share)) * self._lead, -fall * self._lead
 
 
 class Along:
@@ -197,7 +197,7 @@ class Ramp:
 _Real = TypeVar("_Real", float, Array)
 
 
-def smooth(share: _Real) -> _Real:
+def _smooth(share: _Real) -> _Real:
     """Cubic function from 0 to 1, with a slope of zero at both ends and of at most 1.5 between them."""
     return share * share * (3.0 - 2.0 * share)
 
@@ -217,7 +217,7 @@ def _winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
     lengths, rates = np.repeat(length[None], count + 1, axis=0), np.zeros((count + 1, len(length)))
-    lengths[:, winch] += by * smooth(share)
+    lengths[:, winch] += by * _smooth(share)
     rates[:, winch] = by * _smooth_slope(share) / (count * period)
     return lengths, rates
 
@@ -311,7 +311,7 @@ class PlatformJog:
         """Set point of the next cycle, or the last set point if the next pose has no solution; see `failed`."""
         self._cycle = min(self._cycle + 1, self._count)
         share = self._cycle / self._count
-        found = self._solver.step(*self._at(smooth(share)))
+        found = self._solver.step(*self._at(_smooth(share)))
         if found.status is not PoseStatus.SOLVED:
             self.failed = f"the jog ended after {1e2 * share:.0f} %: the next pose is {found.status.name}"
             self._point, self.stops_hard = self._point._replace(done=True), bool(self._point.rate.any())

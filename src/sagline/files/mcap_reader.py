@@ -40,7 +40,7 @@ _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")  # channel, sequence number, two t
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
 
 
-class Truth(NamedTuple):
+class _Truth(NamedTuple):
     """True pose of the platform at one time."""
 
     stamp: int  # time on the log's clock [ns]
@@ -61,7 +61,7 @@ class RecordedLog:
     endings: dict[int, tuple[str, str]] = field(default_factory=dict)
     blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, for each chunk
     events: list[Event] = field(default_factory=list)  # events in order
-    truth: list[Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
+    truth: list[_Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
     epoch: int = 0  # zero of the log's clock [ns]
     complete: bool = False  # True if the end of the log has been read
 
@@ -203,7 +203,7 @@ class LogReader:
             log.events.append(_event_of(data))
         elif topic == TRUTH:
             said = json.loads(data)
-            log.truth.append(Truth(stamp, float(said["time"]), said["position"], said["quaternion"]))
+            log.truth.append(_Truth(stamp, float(said["time"]), said["position"], said["quaternion"]))
 
     def _damaged(self) -> FileError:
         return FileError(self.log.path, f"is damaged at byte {self._offset:,}", AGAIN)

@@ -48,10 +48,10 @@ def system_errors(path: Path) -> Iterator[None]:
     except FileNotFoundError:
         raise FileError(path, "does not exist", "Check its name.") from None
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        raise unreadable(path, error) from None
+        raise _unreadable(path, error) from None
 
 
-def unreadable(path: Path, error: Exception) -> FileError:
+def _unreadable(path: Path, error: Exception) -> FileError:
     """Create the FileError for a file that the system cannot read."""
     reason = getattr(error, "strerror", None) or error
     return FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.")
@@ -74,7 +74,7 @@ def read_bytes(path: Path, limit: float) -> bytes:
         with path.open("rb") as file:
             data = file.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte or a lone surrogate
-        raise unreadable(path, error) from None
+        raise _unreadable(path, error) from None
     if data.startswith(HDF_BEGIN):
         step = "Give a robot, path or log here. To look at a plan or a simulation: sagline view ROBOT FILE."
         raise FileError(path, "is a NetCDF file, for example a plan or a workspace", step)

@@ -30,7 +30,7 @@ PARTS = {
 }
 
 
-class Known(Enum):
+class _Known(Enum):
     """Poses at which a quantity has values; the quantity is NaN at all other poses."""
 
     EVERYWHERE = "at every pose"
@@ -38,7 +38,7 @@ class Known(Enum):
     SOMEWHERE = "at any poses"
 
 
-EVERYWHERE, SOLVED, SOMEWHERE = Known
+EVERYWHERE, SOLVED, SOMEWHERE = _Known
 
 
 class Quantity(NamedTuple):
@@ -51,7 +51,7 @@ class Quantity(NamedTuple):
     # attribute of the result, with dots for nested attributes; `name` is appended if it is "" or ends with a dot
     source: str = ""
     # poses with values; in records, a missing integer of a quantity with values SOMEWHERE is `NONE`
-    known: Known = EVERYWHERE
+    known: _Known = EVERYWHERE
     low: float = -np.inf  # lowest value
     infinite: bool = False  # True if values may be infinite
     codes: type[IntEnum] | None = None  # enumeration of statuses, if the values are codes
