@@ -6,6 +6,7 @@ import reprlib
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import numpy as np
+from attrs import NOTHING, fields
 from pydantic import Field, model_validator
 
 from sagline.cables.cable import Cable
@@ -209,12 +210,8 @@ class _Inertia(_RobotPart):
         return exactly([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], "inertia", "kg m^2", (3, 3))
 
 
-class _TestBox(YamlEntry):
+class _TestBox(schema_of(units(PoseBox) | {"tilt": "rad"}, ("low", "high"))):  # type: ignore[misc]
     """Schema of the test box: poses for tests of the robot."""
-
-    low: Meters
-    high: Meters
-    tilt: Annotated[Any, "rad"] = 0.0
 
 
 class _Deviations(schema_of({name: what.unit for name, what in UNCERTAIN.items()})):  # type: ignore[misc]
@@ -262,31 +259,18 @@ class _Calibration(YamlEntry):
         return Provenance(self.log, self.date, self.standard_error.of(robot, _ERROR), self.note)
 
 
-class RobotEntry(YamlEntry):
-    """Schema of a whole robot file. Keys and defaults are those of the fields of `Robot`."""
+# the fields of Robot, in their order: quantities by their units, texts, and parts with a schema of their own
+_PARTS: Final = {
+    **{"cables": _Cables, "winches": _Winches | None, "inertia": _Inertia | None, "test_box": _TestBox | None},
+    **{"assumed": dict[str, str], "tolerances": _Deviations | None, "calibration": _Calibration | None},
+}
+_KEYS: Final = {field.name: field.metadata.get("unit", str) for field in fields(Robot)} | _PARTS
+_REQUIRED: Final = [field.name for field in fields(Robot) if field.default is NOTHING]
 
-    name: str
-    frame_anchors: Meters
-    platform_anchors: Meters
-    cables: _Cables
-    winches: _Winches | None = None
-    mass: Annotated[Any, "kg"]
-    inertia: _Inertia | None = None
-    center_of_mass: Meters = None
-    gravity: Annotated[Any, "m/s^2"] = None
-    motion_pattern: str = ""
-    plane_normal: Annotated[Any, ""] = None
-    tension_min: Newtons = None
-    tension_max: Newtons = None
-    tension_limits_of: str = ""
-    platform_size: Meters = None
-    frame_size: Meters = None
-    test_box: _TestBox | None = None
-    source: str = ""
-    assumed: dict[str, str] = Field(default_factory=dict)
-    notes: str = ""
-    tolerances: _Deviations | None = None
-    calibration: _Calibration | None = None
+
+class RobotEntry(schema_of(_KEYS, _REQUIRED)):  # type: ignore[misc]
+    """Schema of a whole robot file. Keys and units are those of the fields of `Robot`."""
+
     scene: list[_ObstacleEntry] = Field(default_factory=list)  # not a field of Robot; see sagline.files.robot_file
 
     def robot(self) -> Robot:

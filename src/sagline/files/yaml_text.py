@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Hashable, Mapping
+from collections.abc import Container, Hashable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar, get_args
@@ -99,10 +99,11 @@ def _si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
     return numbers
 
 
-def schema_of(units_of_keys: Mapping[str, str]) -> Any:
-    """Create the schema of a mapping with optional keys. `units_of_keys`: unit of each key."""
-    keys: dict[str, Any] = {name: (Annotated[Any, unit], None) for name, unit in units_of_keys.items()}
-    return create_model("_Keys", __base__=YamlEntry, **keys)
+def schema_of(keys: Mapping[str, Any], required: Container[str] = ()) -> Any:
+    """Create the schema of a mapping. `keys`: for each key, the unit of a quantity, or another type of value."""
+    kinds = {name: Annotated[Any, what] if isinstance(what, str) else what for name, what in keys.items()}
+    found: dict[str, Any] = {name: (kind, ... if name in required else None) for name, kind in kinds.items()}
+    return create_model("_Keys", __base__=YamlEntry, **found)
 
 
 Schema = TypeVar("Schema", bound=YamlEntry)

@@ -14,7 +14,7 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import brief, choice, instance, label, optional, text, whole_number
 from sagline.core.arrays import Array, exactly, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.fields import given, given_by_name, if_known, reduced
+from sagline.core.fields import given, given_by_name, if_known, reduced, rule
 from sagline.core.results import Shown, set_fields
 from sagline.robot import checks
 from sagline.robot.checks import MOTION_PATTERNS, MotionPattern, freedom_matrix
@@ -85,21 +85,21 @@ class Robot(Shown):
     """
 
     name: str
-    frame_anchors: Array = field(converter=given)
-    platform_anchors: Array = field(converter=given)
+    frame_anchors: Array = field(converter=given, metadata=rule("m"))
+    platform_anchors: Array = field(converter=given, metadata=rule("m"))
     cables: Cable
     winches: Winch | None = field(default=None, kw_only=True)
-    mass: float
+    mass: float = field(metadata=rule("kg"))
     inertia: Array = field(default=None, converter=_given_or_none)
-    center_of_mass: Array = field(default=(0.0, 0.0, 0.0), kw_only=True, converter=given)
-    gravity: float = field(default=9.81, kw_only=True)
+    center_of_mass: Array = field(default=(0.0, 0.0, 0.0), kw_only=True, converter=given, metadata=rule("m"))
+    gravity: float = field(default=9.81, kw_only=True, metadata=rule("m/s^2"))
     motion_pattern: MotionPattern = field(default="3R3T", kw_only=True)
-    plane_normal: Array | None = field(default=None, kw_only=True, converter=if_known)
-    tension_min: Array = field(default=0.0, kw_only=True, converter=given)
-    tension_max: Array = field(default=np.inf, kw_only=True, converter=given)
+    plane_normal: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule(""))
+    tension_min: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("N"))
+    tension_max: Array = field(default=np.inf, kw_only=True, converter=given, metadata=rule("N"))
     tension_limits_of: TensionLimitsOf = field(default="chord", kw_only=True)
-    platform_size: Array | None = field(default=None, kw_only=True, converter=if_known)
-    frame_size: Array | None = field(default=None, kw_only=True, converter=if_known)
+    platform_size: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m"))
+    frame_size: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m"))
     test_box: PoseBox | None = field(default=None, kw_only=True)
     source: str = field(default="", kw_only=True)
     assumed: Mapping[str, str] = field(default=MappingProxyType({}), kw_only=True)
