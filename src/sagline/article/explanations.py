@@ -19,7 +19,7 @@ WIDTH, HEIGHT = "platform anchors, outward", "platform anchors, up and down"
 Errors: TypeAlias = Mapping[str, float]  # parameter name: error in the unit of the parameter; a missing error is zero
 
 
-class _Parameter(NamedTuple):
+class Parameter(NamedTuple):
     """Parameter of the prototype that may differ from Table 1, with the same error for all cables."""
 
     name: str
@@ -30,16 +30,16 @@ class _Parameter(NamedTuple):
 
 
 PARAMETERS = (
-    _Parameter(MODULUS, "%", 20.0, 50.0),
-    _Parameter(DENSITY, "%", 20.0, 30.0),
-    _Parameter(LOAD, "kg", -2.0, 5.0),
-    _Parameter(ANCHORS, "mm", 20.0, 50.0),
-    _Parameter(DRUM, "%", -1.0, 3.0),
-    _Parameter(ZERO, "mm", -10.0, 50.0),
-    _Parameter(PULLEY, "mm", 30.0, 60.0, positive=True),
-    _Parameter(DEAD, "m", 0.2, 4.0, positive=True),
-    _Parameter(WIDTH, "mm", 10.0, 20.0),
-    _Parameter(HEIGHT, "mm", 10.0, 20.0),
+    Parameter(MODULUS, "%", 20.0, 50.0),
+    Parameter(DENSITY, "%", 20.0, 30.0),
+    Parameter(LOAD, "kg", -2.0, 5.0),
+    Parameter(ANCHORS, "mm", 20.0, 50.0),
+    Parameter(DRUM, "%", -1.0, 3.0),
+    Parameter(ZERO, "mm", -10.0, 50.0),
+    Parameter(PULLEY, "mm", 30.0, 60.0, positive=True),
+    Parameter(DEAD, "m", 0.2, 4.0, positive=True),
+    Parameter(WIDTH, "mm", 10.0, 20.0),
+    Parameter(HEIGHT, "mm", 10.0, 20.0),
 )
 
 
@@ -106,7 +106,7 @@ ITERATIONS = 20
 CONVERGED = 1e-5  # largest motion of the platform [m] in the last step of a converged fit; Table 2 is in millimeters
 NEAR = 1e-3  # largest distance from a limit, relative to the upper limit, of a value that counts as at the limit
 
-Model: TypeAlias = tuple[_Parameter, ...]
+Model: TypeAlias = tuple[Parameter, ...]
 ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # gives actual minus desired positions [m], (K, N, 3)
 
 
@@ -164,7 +164,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
     return tuple(_explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))
 
 
-def subsets(parameters: Sequence[_Parameter], most: int) -> list[Model]:
+def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
     """All sets of one to `most` parameters, each of which is a model."""
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
