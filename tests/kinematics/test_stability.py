@@ -9,6 +9,7 @@ import pytest
 
 import sagline as sl
 import sagline.control.checks
+from sagline.kernels import codes
 from sagline.kinematics import inverse_rows
 from tests.kinematics.feasible import box_poses
 
@@ -31,6 +32,8 @@ def planar(moment: float = 0.0) -> sl.Robot:
 CASES: dict[str, tuple[sl.Robot, sl.CableModel]] = {
     "mixed": (LOW, sl.Catenary()),
     "parabolic": (LOW, sl.Parabolic()),
+    "empirical": (LOW.replace(cables=LOW.cables.replace(linear_density=0.3), tension_min=8.0), sl.Empirical()),
+    "parabolic, pulleys": (LOW.replace(winches=sl.Winch(0.1, dead_cable=3.0, dead_rise=2.0)), sl.Parabolic()),
     "pulleys": (LOW.replace(winches=sl.Winch(0.1, dead_cable=3.0, dead_rise=2.0)), sl.Catenary()),
     "soft": (LOW.replace(cables=LOW.cables.replace(axial_stiffness=2e3)), sl.Catenary()),
     "elastic": (LOW.replace(cables=LOW.cables.replace(axial_stiffness=500.0)), sl.Elastic()),
@@ -111,14 +114,42 @@ def test_a_solver_agrees_with_the_batch(stability: bool) -> None:
         np.testing.assert_array_equal(lengths, plan.unstrained_length[k])
 
 
+MODELS = (sl.Catenary(), sl.Elastic(), sl.Parabolic(), sl.Empirical(), sl.Straight())
+
+
 @pytest.mark.parametrize("name", [name for name in sl.robot_names() if name != "article-mixed"])
 def test_presets_need_no_eigenvalues(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The proof from the solution takes a tenth of the time of the inverse; eigenvalues would take half of it."""
+    """The proof from the solution takes a tenth of the time of the inverse; eigenvalues would take as long as it."""
     monkeypatch.setattr(inverse_rows, "stabilities_of_poses", None)
     robot = sl.load_robot(name)
-    plan = sl.inverse(robot, box_poses(robot, 300, seed=3))
-    assert plan.solved.sum() >= 250
-    assert np.nanmin(plan.stiffness_min) > 0.0
+    for model in MODELS:
+        plan = sl.inverse(robot, box_poses(robot, 300, seed=3), model)
+        assert plan.solved.sum() >= 250
+        least = plan.stiffness_min[plan.solved]
+        assert np.isnan(least).all() if model == sl.Straight() else (least > 0.0).all()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_proofs_and_eigenvalues_agree(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At tensions near the limit of stability, all poses have the same status by proofs and by eigenvalues alone."""
+    robot, _ = CASES[case]
+    proved, decide = 0, inverse_rows.decide_stability
+
+    def by_eigenvalues(robot: Any, model: Any, rows: Any, found: inverse_rows.InverseRows) -> None:
+        nonlocal proved
+        proved += int((found.pose_status == codes.POSE_SOLVED).sum())
+        decide(robot, model, rows, found)
+        expected = found.pose_status.copy()
+        found.pose_status[np.isin(expected, (codes.POSE_SOLVED, codes.POSE_UNSTABLE))] = codes.UNPROVED_STABILITY
+        decide(robot, model, rows, found)
+        np.testing.assert_array_equal(found.pose_status, expected)
+
+    monkeypatch.setattr(inverse_rows, "decide_stability", by_eigenvalues)
+    for model in MODELS:
+        for least in (1.0, 30.0, 60.0, 120.0):
+            tight = robot.replace(tension_min=least)
+            sl.inverse(tight, poses_of(tight, 150), model, METHOD)
+    assert proved > 100
 
 
 def test_gaps_separate_infeasible_and_unstable_poses() -> None:

@@ -295,6 +295,8 @@ def _motion_of(motion: Path | PoseLike) -> Path | Pose:
 
 def _in_world(components: Array, robot: Robot) -> Array:
     """Wrenches (N, 6) from components (N, n) along the free motions; einsum is faster here than matrix products."""
+    if components.shape[1] == robot.freedom.shape[1]:  # all motions are free, the matrix is the identity
+        return components
     wrench: Array = np.einsum("pi,ij->pj", components, robot.freedom)
     return wrench
 

@@ -76,6 +76,8 @@ class InverseRows(NamedTuple):
     def reject_slack(self, lengths: Array) -> bool:
         """Set TOO_SLACK at solved poses where `lengths` (N, m) between guides are NaN. True if such a pose exists."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
+        if not slack.any():
+            return False
         lost = np.isin(self.pose_status, SOLVED) & slack.any(axis=-1)
         if not lost.any():
             return False

@@ -336,7 +336,8 @@ SHALLOW_STEPS = 60
 @kernel
 def stretching_tension(tension: float, sine: float, cosine: float, sag_force: float) -> float:
     """Magnitude of the force on the platform end [N], equal to the chord tension if `sag_force` is 0."""
-    return math.hypot(tension * cosine, tension * sine + sag_force)
+    horizontal, vertical = tension * cosine, tension * sine + sag_force
+    return math.sqrt(horizontal * horizontal + vertical * vertical)
 
 
 @kernel

@@ -72,10 +72,9 @@ def exit_after(
     # length. Large steps are halved, because the exit point of a slack cable could otherwise move back and forth
     # without end.
     # force: T_x and T_zA of the cable at the wrap angle before the step.
+    # The formula has no branches, so that loops over cables vectorize.
     horizontal, vertical_a = force
     tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
-    if tension == 0.0 or horizontal < 0.0:  # a weightless cable without tension, or with a rounding error of it
-        return before
     inverse = 1.0 / tension
     # minus the derivative of the force's angle with respect to the wrap angle
     turned = pulley.entry * before[0] * weight * pulley.radius * inverse / (1.0 + tension / stiffness)
@@ -85,10 +84,13 @@ def exit_after(
     inverse = 1.0 / math.sqrt(sine * sine + cosine * cosine)
     sine, cosine = sine * inverse, cosine * inverse
     turn = sine * before[0] + cosine * before[1]  # cosine of the angle of the step
-    if VERTICAL < turn < LARGE:
-        inverse = 1.0 / math.sqrt(2.0 + 2.0 * turn)
-        sine, cosine = (before[0] + sine) * inverse, (before[1] + cosine) * inverse
-    return sine, cosine
+    whole = turn >= LARGE or turn <= VERTICAL
+    inverse = 1.0 / math.sqrt(2.0 + 2.0 * turn)
+    sine = sine if whole else (before[0] + sine) * inverse
+    cosine = cosine if whole else (before[1] + cosine) * inverse
+    # false for a weightless cable without tension, or with a rounding error of it
+    directed = tension > 0.0 and horizontal >= 0.0
+    return sine if directed else before[0], cosine if directed else before[1]
 
 
 @formula

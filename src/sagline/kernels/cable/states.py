@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels import codes
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import models
 from sagline.kernels.cable.geometry import cable_geometry
@@ -33,7 +34,7 @@ from sagline.kernels.cable.terms import (
     model_of,
     pulley_of,
 )
-from sagline.kernels.jit import entry, formula, glue, kernel
+from sagline.kernels.jit import entry, formula, glue, independent, kernel
 
 # Largest relative change of tension after which one Newton step from the last ratio is sufficient. The relative error
 # of the ratio is then 3e-8 at X = 2 and 5e-15 at X = 0.01. The error is proportional to the square of the change, so
@@ -54,34 +55,43 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
     # The forces are computed from the chord tensions and from the last lengths and sag forces. If `fresh` is true, no
     # lengths and sag forces exist yet, and first-order values are used. Cables of the shallow models leave the pulley
     # along their chord. Returns the largest change of an exit direction.
-    exact = model.code == codes.CATENARY
+    # Loops without branches, which vectorize, compute all cables.
+    m = cables.tau.size
     change = 0.0
-    for i in range(cables.tau.size):
+    if fresh or model.code != codes.CATENARY:
+        for i in range(m):
+            cables.wrap_sine[i] = cables.cosine[i]  # direction of the tangent
+            cables.wrap_cosine[i] = cables.entry[i] * cables.sine[i]
+    if fresh:
+        copy(cables.half_weight, cables.sag_force)
+        copy(cables.chord, cables.free_chord)
+        cables.ratio[:] = 1.0
+    if model.code == codes.CATENARY:
+        turned = cables.strain  # changes of the directions; the strains are filled later
+        for i in independent(m):
+            weight = cables.density[i] * model.gravity
+            horizontal = cables.tau[i] * cables.cosine[i]
+            hanging = cables.sag_force[i] - weight * cables.ratio[i] * cables.free_chord[i]
+            vertical_a = cables.tau[i] * cables.sine[i] + hanging
+            before = (cables.wrap_sine[i], cables.wrap_cosine[i])
+            sine, cosine = exit_after(
+                pulley_of(cables, i), weight, cables.stiffness[i], (horizontal, vertical_a), before
+            )
+            turned[i] = abs(sine - before[0]) + abs(cosine - before[1])
+            cables.wrap_sine[i] = sine
+            cables.wrap_cosine[i] = cosine
+        for i in range(m):
+            change = max(change, turned[i])
+    for i in independent(m):
         chord, pulley = chord_of(cables, i), pulley_of(cables, i)
-        half_density = 0.5 * cables.density[i] * model.gravity
-        horizontal = cables.tau[i] * chord.cosine
-        hanging = -half_density * chord.length
-        if not fresh:
-            hanging = cables.sag_force[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
-        vertical_a = cables.tau[i] * chord.sine + hanging
-        before = (chord.cosine, pulley.entry * chord.sine)  # the direction of the tangent
-        sine, cosine = before
-        if exact:
-            if not fresh:
-                before = (cables.wrap_sine[i], cables.wrap_cosine[i])
-            weight, force = 2.0 * half_density, (horizontal, vertical_a)
-            sine, cosine = exit_after(pulley, weight, cables.stiffness[i], force, before)
-        change = max(change, abs(sine - before[0]) + abs(cosine - before[1]))
-        span, rise = free_span(pulley, chord, cosine), free_rise(pulley, chord, sine)
+        span, rise = free_span(pulley, chord, cables.wrap_cosine[i]), free_rise(pulley, chord, cables.wrap_sine[i])
         length = math.sqrt(span * span + rise * rise)
         inverse = 1.0 / length
-        cables.wrap_sine[i] = sine
-        cables.wrap_cosine[i] = cosine
         cables.free_chord[i] = length
         cables.free_sine[i] = rise * inverse
         cables.free_cosine[i] = span * inverse
-        cables.free_tau[i] = horizontal / span * length
-        cables.free_half_weight[i] = half_density * length
+        cables.free_tau[i] = cables.tau[i] * chord.cosine / span * length
+        cables.free_half_weight[i] = 0.5 * cables.density[i] * model.gravity * length
     return change
 
 

@@ -1,9 +1,10 @@
 """Proof that the equilibrium of a solved pose is stable, from values of its solution; docs/model.md, section 6.
 
-The stiffness of a platform end is positive definite. Let u be the unit vector along the chord and c the compliance
-along u. The stiffness is then at least u u^T/c. With any right inverse A of the structure matrix J, the inverse of J
-diag(1/c) J^T is at most A^T diag(c) A. Only the geometric stiffness G of the rotations can be negative. The equilibrium
-is stable if 1 + L^T G L is positive definite, where L L^T is the part of A^T diag(c) A for the rotations.
+The symmetric part of the stiffness of a platform end is at least u u^T/c, where u is the unit vector along the chord.
+For exact and weightless cables, c is the compliance along u. With any right inverse A of the structure matrix J, the
+inverse of J diag(1/c) J^T is at most A^T diag(c) A. Only the geometric stiffness G of the rotations can be negative.
+The equilibrium is stable if 1 + L^T G L is positive definite, where L L^T is the part of A^T diag(c) A for the
+rotations.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from sagline.kernels import codes
 from sagline.kernels.algebra.factors import factor_positive
 from sagline.kernels.algebra.functions import EXCESS_LIMIT, atanhc_excess_polynomial
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.models import sag_of_shallow
 from sagline.kernels.cable.pulley import Wrap, softness
 from sagline.kernels.cable.terms import Cables, Model, pulley_of
-from sagline.kernels.jit import glue
-from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.jit import glue, independent
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import Balance, Platform
 
 ROUNDING = 0.01  # a proof with a smaller margin is rejected, because of rounding errors
@@ -28,7 +30,8 @@ ROUNDING = 0.01  # a proof with a smaller margin is rejected, because of roundin
 class StabilityArrays(NamedTuple):
     """Work arrays of the proof, for `m` cables and `k` free rotations."""
 
-    compliance: Array  # compliance of the platform ends along their chords [m/N], (m,)
+    compliance: Array  # bounds c of the compliances of the platform ends along their chords [m/N], (m,)
+    coupling: Array  # shallow cables: stiffness along the chord that is lost by the transverse terms [N/m], (m,)
     torque: Array  # sum over cables of r T^T [N m], (3, 3); r: lever, T: force on a cable at its platform end
     geometric: Array  # geometric stiffness of the rotations [N m], (k, k)
     elastic: Array  # upper bound of the compliance of the rotations [1/(N m)], overwritten by its factor L, (k, k)
@@ -38,19 +41,18 @@ class StabilityArrays(NamedTuple):
 @glue
 def new_stability_arrays(memory: Memory, m: int, k: int) -> tuple[StabilityArrays, Memory]:
     """Work arrays for m cables and k free rotations, and the remaining memory."""
-    compliance, memory = vector(memory, m)
+    rows, memory = block(memory, 2, m)
     torque, memory = block(memory, 3, 3)
     squares, memory = block(memory, 4 * k, k)
-    return StabilityArrays(compliance, torque, squares[:k], squares[k : 2 * k], squares[2 * k :]), memory
+    arrays = StabilityArrays(rows[0], rows[1], torque, squares[:k], squares[k : 2 * k], squares[2 * k :])
+    return arrays, memory
 
 
 @glue
 def proves_stability(model: Model, platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays) -> bool:
-    """True if the work arrays prove that the equilibrium of a solved pose is stable. False if the proof fails."""
+    """True if the equilibrium of a solved pose is proved stable, or its cables are straight, without a stiffness."""
     k = work.geometric.shape[0]
-    if model.code != codes.CATENARY and model.code != codes.ELASTIC:
-        return False
-    if k == 0:
+    if model.code == codes.STRAIGHT or k == 0:
         return True
     _fill_geometric_stiffness(platform, cables, balance, work)
     least = 0.0  # bound of the eigenvalues by Gershgorin's circles
@@ -60,7 +62,7 @@ def proves_stability(model: Model, platform: Platform, cables: Cables, balance: 
             if i != j:
                 low -= abs(work.geometric[j, i])
         least = min(least, low)
-    _fill_compliances(model, cables, work.compliance)
+    _fill_compliances(model, cables, work)
     first = balance.inverse.shape[0] - k
     trace = 0.0
     for i in range(cables.tau.size):
@@ -108,10 +110,36 @@ def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balan
 
 
 @glue
-def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
-    """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N]."""
-    # Without pulleys, the bounds are exact. For deep sag, beyond the range of the polynomial, the bounds are infinite.
-    for i in range(cables.tau.size):
+def _fill_compliances(model: Model, cables: Cables, work: StabilityArrays) -> None:
+    """Fill upper bounds of the compliances c of the platform ends along their chords, (m,) [m/N]."""
+    compliance = work.compliance
+    shallow = model.code != codes.CATENARY and model.code != codes.ELASTIC
+    if shallow:
+        _fill_shallow_compliances(model, cables, work)
+    else:
+        _fill_exact_compliances(model, cables, compliance)
+    if cables.machine:
+        for i in independent(cables.tau.size):
+            length = cables.ratio[i] * cables.free_chord[i]
+            weight = cables.density[i] * model.gravity if model.code == codes.CATENARY else 0.0
+            x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i]
+            za = z + (cables.sag_force[i] - weight * length if model.code == codes.CATENARY else 0.0)
+            at_frame = math.sqrt(x * x + za * za)
+            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], math.pi)  # psi at its largest value
+            strained = 1.0 + at_frame / cables.stiffness[i]
+            soft = strained * softness(pulley_of(cables, i), weight, cables.stiffness[i], at_frame, wrap)
+            compliance[i] += strained * soft / (1.0 + weight * za / at_frame * soft)
+    if shallow:
+        for i in independent(cables.tau.size):
+            left = 1.0 - compliance[i] * work.coupling[i]
+            compliance[i] = compliance[i] / left if left > 0.0 else math.inf
+
+
+@glue
+def _fill_exact_compliances(model: Model, cables: Cables, compliance: Array) -> None:
+    """Fill the compliances u.(dB/dT) u of exact or weightless cables without pulleys."""
+    # For deep sag, beyond the range of the polynomial, the compliances are infinite.
+    for i in independent(cables.tau.size):
         length = cables.ratio[i] * cables.free_chord[i]
         weight = cables.density[i] * model.gravity if model.code == codes.CATENARY else 0.0
         x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + cables.sag_force[i]
@@ -128,17 +156,30 @@ def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
         bend = mixed * cosine - larger * sine if level >= 0.0 else larger * cosine - mixed * sine
         bent = 2.0 * excess * cosine * cosine + bend * bend / larger
         compliance[i] = length * (1.0 / cables.stiffness[i] + turn * bent)
-    if cables.machine:
-        for i in range(cables.tau.size):
-            length = cables.ratio[i] * cables.free_chord[i]
-            weight = cables.density[i] * model.gravity if model.code == codes.CATENARY else 0.0
-            x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + cables.sag_force[i]
-            za = z - weight * length
-            at_frame = math.sqrt(x * x + za * za)
-            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], math.pi)  # psi at its largest value
-            strained = 1.0 + at_frame / cables.stiffness[i]
-            soft = strained * softness(pulley_of(cables, i), weight, cables.stiffness[i], at_frame, wrap)
-            compliance[i] += strained * soft / (1.0 + weight * za / at_frame * soft)
+
+
+@glue
+def _fill_shallow_compliances(model: Model, cables: Cables, work: StabilityArrays) -> None:
+    """Fill 1/a and the coupling of shallow cables without pulleys, where a is the stiffness along the chord."""
+    # In the axes u and n (normal to the chord in the cable's plane), the stiffness is ((a, p), (q, tau/D)) from the
+    # slopes of `_shallow_slopes`. Its symmetric part is at least (a - e^2 D/tau) u u^T with e = (p + q)/2. Cable behind
+    # a pulley, in series, reduces tau/D by less than |p q|/a.
+    for i in independent(cables.tau.size):
+        tau, chord, sine, cosine = cables.tau[i], cables.chord[i], cables.sine[i], cables.cosine[i]
+        density = cables.density[i] if model.gravity != 0.0 else 0.0  # without gravity, the cables are weightless
+        stretched = cables.sag_force[i] if model.code == codes.EMPIRICAL else 0.0  # sag force that stretches the cable
+        x, z = tau * cosine, tau * sine + stretched
+        strain = cables.ratio[i] / (math.sqrt(x * x + z * z) * cables.stiffness[i])
+        sag = sag_of_shallow(model, density * chord) / (tau * tau)
+        share = sag * cosine * cosine
+        slope = 1.0 / (chord * (strain * (tau + stretched * sine) + 2.0 * share / tau))
+        unit = cables.sag_force[i] / chord
+        along = slope * (1.0 + 3.0 * share - strain * (stretched + tau * sine) * stretched) + unit * sine
+        p, q = -slope * cosine * (2.0 * sag * sine + strain * tau * stretched), unit * cosine
+        across = tau / chord - abs(p * q) / along
+        work.compliance[i] = 1.0 / along
+        solvable = along > 0.0 and across > 0.0
+        work.coupling[i] = 0.25 * (p + q) * (p + q) / across if solvable else math.inf
 
 
 @glue
