@@ -41,8 +41,7 @@ def run(files: opt.Files = opt.Files()) -> int:
     tension = sl.MinimumNorm("horizontal")
     robots = [sl.load_robot(name) for name in ROBOTS]
     plans = [run_name(robot, model) for robot in robots for model in models]
-    hulls = [f"{name}.glb" for name in HULLS]
-    parts = [*(f"{name}.nc" for name in plans), *hulls]
+    parts = [*(f"{name}.nc" for name in plans), *(f"{name}.glb" for name in HULLS)]
     output = Output(files, "", parts, [*FIGURES, *HULLS], *(f"{name}.csv" for name in plans))
     path, runs = sl.article_path(), []
     with working("planning the article's path, and confirming it with exact cables") as line:

@@ -59,8 +59,7 @@ def control(
         controller = sl.control.Controller(robot, link, pace=sl.control.Pace(), record=record, shadow=shadow)
         gc.collect()
         gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
-        session = OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow)
-        return session.run()
+        return OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow).run()
 
 
 LOOK: Final = 0.1  # time between two checks of the PLCs [s]

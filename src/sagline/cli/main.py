@@ -143,7 +143,6 @@ class _Group(TyperGroup):
     """The group of the subcommands. It turns an error of a subcommand into one line and an exit code."""
 
     def __init__(self, **attributes: Any) -> None:
-        """Take the attributes from the group that typer makes."""
         super().__init__(**attributes)
         self.commands: Any = _Commands()
 

@@ -70,8 +70,7 @@ class _StatusLine:
     def _fit(self) -> None:
         """Set the scrolling region to all lines except the last one."""
         self._size = shutil.get_terminal_size()
-        rows = self._size[1]
-        self._say(f"\n\x1b7\x1b[1;{max(rows - 1, 1)}r\x1b8\x1b[A")
+        self._say(f"\n\x1b7\x1b[1;{max(self._size[1] - 1, 1)}r\x1b8\x1b[A")
 
     def _say(self, text: str) -> None:
         sys.stdout.write(text)

@@ -223,8 +223,7 @@ def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Pl
         time.sleep(LOOK)
     while (session := follower.more()) is None:
         if not live:
-            file = follower.log.path
-            raise sl.FileError(file, "has no cycle", "Record at least one cycle.")
+            raise sl.FileError(follower.log.path, "has no cycle", "Record at least one cycle.")
         time.sleep(LOOK)
     return session
 

@@ -181,8 +181,7 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
 def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
     """Draw maps of the expected errors before and after the calibration."""
     x, y, z = _slice(found, at)
-    grid = np.stack(np.meshgrid(x, y, [z], indexing="ij"), axis=-1).reshape(-1, 3)
-    poses = Pose(grid, np.eye(3))
+    poses = Pose(np.stack(np.meshgrid(x, y, [z], indexing="ij"), axis=-1).reshape(-1, 3), np.eye(3))
     own = any("world" in direction.name for direction in found.gauge)
     maps = []
     for each in (_before(found), found):

@@ -253,7 +253,6 @@ def _described(direction: str, about: str, along: str) -> str:
 
 
 def _damping(vibration: Vibration | FrequencyResponse) -> str:
-    """Text of the damping that both curves have."""
     damping = vibration.damping
     parts = [
         f"modal damping {100.0 * damping.modal_damping:g} %" if damping.modal_damping else "",

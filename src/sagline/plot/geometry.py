@@ -206,8 +206,7 @@ def _borders(ends: Array, codes: Indices, find: Find) -> Array:
     change = np.flatnonzero(codes[:, 0] != codes[:, 1])
     for _ in range(BISECTIONS):
         middle = 0.5 * (ends[change, 0] + ends[change, 1])
-        there = np.where(find(middle) == codes[change, 0], 0, 1)
-        ends[change, there] = middle
+        ends[change, np.where(find(middle) == codes[change, 0], 0, 1)] = middle
     return np.asarray(0.5 * (ends[:, 0] + ends[:, 1]))
 
 

@@ -126,13 +126,11 @@ def solids_data(robot: Robot) -> dict[str, Any]:
 def colors(robot: Robot) -> dict[str, Any]:
     """Color scale of the tensions: colors, ticks and unit."""
     scale, unit = TensionScale.of(robot), ForceUnit.up_to(float(_highest(robot)))
-    shares = np.linspace(0.0, 1.0, 24)
-    steps = scale.low * (scale.high / scale.low) ** shares
     ticks = scale.ticks()
     return {
         "low": scale.low,
         "high": scale.high,
-        "steps": scale.colors(steps).tolist(),
+        "steps": scale.bar(24).tolist(),
         "ticks": [[float(scale.fraction(np.array(tick))), f"{tick / unit.newtons:,g}"] for tick in ticks],
         "unit": unit.name,
         "newtons": unit.newtons,

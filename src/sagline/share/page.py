@@ -124,7 +124,6 @@ def _facts(robot: Robot, machine: dict[str, Any]) -> dict[str, Any]:
 
 
 def _about(robot: Robot) -> str:
-    """Line with the number of cables, the degrees of freedom and the mass."""
     mass = n(robot.mass, ".4g", "kg")
     return f"{robot.cable_count} cables, {robot.degrees_of_freedom} degrees of freedom, a platform of {mass}"
 

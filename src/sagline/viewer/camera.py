@@ -66,8 +66,7 @@ class Camera(NamedTuple):
     def nearest_line(self, at: ArrayLike, lines: Array, within: float) -> int | None:
         """Of all `lines` within `within` [px] of the picture point `at`, the line nearest to the viewer; or None."""
         places, deep = self.project(lines)
-        pixel = np.asarray(at) * self.pixels
-        start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
+        start, run = places[:, :-1] - np.asarray(at) * self.pixels, np.diff(places, axis=1)
         length = np.maximum(np.einsum("mpi,mpi->mp", run, run), 1e-12)
         share = np.clip(-np.einsum("mpi,mpi->mp", start, run) / length, 0.0, 1.0)
         away = np.linalg.norm(start + share[..., None] * run, axis=-1)

@@ -106,7 +106,6 @@ def _infeasible_spans(plan: Plan, time: Array) -> tuple[Span, ...]:
 
 
 def _sample(plan: Plan, i: int) -> Plan:
-    """The plan of one pose of a plan."""
     values = {field.name: getattr(plan, field.name) for field in fields(plan)}
     entries = {name: value[i] for name, value in values.items() if isinstance(value, np.ndarray)}
     return replace(plan, state=plan.state[i], path=None, **entries)

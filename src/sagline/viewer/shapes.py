@@ -296,12 +296,10 @@ def platform_solid(robot: Robot) -> Solid:
 
 
 def _cuboid(middle: Array, edges: Array) -> Solid:
-    """A box along the axes."""
     return _hull(box_corners(middle - 0.5 * edges, middle + 0.5 * edges))
 
 
 def _merged(parts: list[Solid]) -> Solid:
-    """Several solids as one."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=True)]
     return Solid(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))

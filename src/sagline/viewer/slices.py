@@ -104,8 +104,7 @@ def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> Mar
 
 def _finer(values: Array) -> Array:
     """Values interpolated between those of each row, for pixels of equal width."""
-    count = values.shape[1]
-    places = (np.arange(FINER * (count - 1)) + 0.5) / FINER
+    places = (np.arange(FINER * (values.shape[1] - 1)) + 0.5) / FINER
     first = places.astype(np.intp)
     share = places - first
     return np.asarray((1.0 - share) * values[:, first] + share * values[:, first + 1])

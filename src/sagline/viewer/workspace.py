@@ -320,7 +320,6 @@ def free_travel(find: Find, start: Array, which: Indices, low: Array, high: Arra
 
 
 def _levels_at(find: Find, places: Array) -> tuple[Array, Indices]:
-    """Levels and limiting cables at positions (K, S, 3)."""
     found = find(places.reshape(-1, 3))
     return found.level.reshape(places.shape[:2]), found.cable.reshape(places.shape[:2])
 

@@ -53,8 +53,7 @@ def simulate_cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Si
 def peak_of(simulation: Simulation, cut: int) -> tuple[int, float, float]:
     """Highest tension of the other cables: its cable, its value at the frame end [N] and its time after the cut [s]."""
     highest = simulation.tensions.max(axis=0) if simulation.largest_tension is None else simulation.largest_tension
-    others = np.where(np.arange(len(highest)) == cut, -np.inf, highest)
-    cable = int(np.argmax(others))
+    cable = int(np.argmax(np.where(np.arange(len(highest)) == cut, -np.inf, highest)))
     time = float(simulation.time[np.argmax(simulation.tensions[:, cable])] - simulation.time[0])
     return cable, float(highest[cable]), time
 

@@ -316,8 +316,7 @@ def _draw_patches(nodes: Nodes, name: str, patches: list[workspace.Patch], side:
 def _scale_of(levels: Levels, region: Region) -> MarginScale:
     """Colors for the range of margins in a region."""
     corners = np.linspace(region.low, region.high, COARSE)
-    grid = np.stack(np.meshgrid(*corners.T), axis=-1).reshape(-1, 3)
-    known = levels.details(grid).margin
+    known = levels.details(np.stack(np.meshgrid(*corners.T), axis=-1).reshape(-1, 3)).margin
     return MarginScale.up_to(float(known[np.isfinite(known)].max(initial=0.0)))
 
 

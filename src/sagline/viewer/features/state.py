@@ -54,8 +54,8 @@ def _parts_of(text: str) -> dict[str, str]:
 
 def name_of(robot: Robot) -> str:
     """Name and checksum of a robot in a link; the checksum excludes the load on the platform."""
-    fixed = dump_robot(robot.replace(mass=1.0, inertia=np.eye(3)))
-    return f"{robot.name}:{crc32(fixed.encode()):08x}"
+    fixed = dump_robot(robot.replace(mass=1.0, inertia=np.eye(3))).encode()
+    return f"{robot.name}:{crc32(fixed):08x}"
 
 
 def pose_part(pose: Pose) -> str:
