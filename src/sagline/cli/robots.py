@@ -15,27 +15,13 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import file_stem
 
-WHOLE = {  # fields of the robot and their units
-    "motion_pattern": "",
-    "plane_normal": "",
-    "mass": "kg",
-    "center_of_mass": "m",
-    "inertia": "kg m²",
-    "gravity": "m/s²",
-    "linear_density": "kg/m",
-    "axial_stiffness": "N",
-    "diameter": "m",
-    "expansion": "1/K",
-    "tension_min": "N",
-    "tension_max": "N",
-    "tension_limits_of": "",
-    "platform_size": "m",
-    "frame_size": "m",
-    "test_box": "m",
-}
-ANCHORS = {"frame_anchors": "m", "platform_anchors": "m"}
 MATERIAL = ("linear_density", "axial_stiffness", "diameter", "expansion")  # fields of the robot's cables
 PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
+ANCHORS = ("frame_anchors", "platform_anchors")
+WHOLE = (  # the other fields of the robot, in the order of the list
+    *("motion_pattern", "plane_normal", "mass", "center_of_mass", "inertia", "gravity", *PER_CABLE),
+    *("tension_limits_of", "platform_size", "frame_size", "test_box"),
+)
 CABLES = "-cables.csv"
 
 
@@ -115,13 +101,14 @@ def _sizes(robots: Sequence[sl.Robot]) -> list[list[object]]:
 
 def _cables(robot: sl.Robot) -> list[list[object]]:
     """Heads of the columns, then anchors, material and limits of each cable. Unknown values are empty cells."""
-    heads = ["cable", *(f"{field} {axis} [{unit}]" for field, unit in ANCHORS.items() for axis in "xyz")]
+    unit = _units()
+    heads = ["cable", *(f"{field} {axis} [{unit[field]}]" for field in ANCHORS for axis in "xyz")]
     known = {field: np.asarray(value) for field in PER_CABLE if (value := _value(robot, field)) is not None}
     columns = [np.broadcast_to(value, robot.cable_count).tolist() for value in known.values()]
     anchors = np.hstack([_value(robot, field) for field in ANCHORS]).tolist()
     rows = zip(anchors, *columns, strict=True)
     return [
-        [*heads, *(f"{field} [{WHOLE[field]}]" for field in known)],
+        [*heads, *(f"{field} [{unit[field]}]" for field in known)],
         *([k, *places, *values] for k, (places, *values) in enumerate(rows)),
     ]
 
@@ -161,12 +148,20 @@ def _value(robot: sl.Robot, field: str) -> Any:
     return getattr(robot.cables if field in MATERIAL else robot, field)
 
 
+def _units() -> dict[str, str]:
+    """Units of the fields of a robot; "" for a field without a unit."""
+    from sagline.core.fields import units
+
+    declared = units(sl.Robot) | units(sl.Cable) | {"inertia": "kg m^2", "test_box": "m"}
+    return {name: declared.get(name, "").replace("^2", "²") for name in (*WHOLE, *ANCHORS)}
+
+
 def _record(robot: sl.Robot) -> dict[str, Any]:
     from sagline.core.fields import units
     from sagline.robot.tolerances import UNCERTAIN
 
     record: dict[str, Any] = {"name": robot.name, "source": robot.source, "notes": robot.notes}
-    for field, unit in (WHOLE | ANCHORS).items():
+    for field, unit in _units().items():
         value = _value(robot, field)
         if field == "test_box" and value is not None:
             value = {"low": value.low, "high": value.high, "tilt_rad": value.tilt}
@@ -245,7 +240,7 @@ def _numbers(row: Any, digits: int = 5) -> str:
 
 
 def _anchors(record: Mapping[str, Any]) -> TextTable:
-    heads = ["cable", *(f"{_marked(field, record[field])} [{unit}]" for field, unit in ANCHORS.items())]
+    heads = ["cable", *(f"{_marked(field, record[field])} [{record[field]['unit']}]" for field in ANCHORS)]
     ends = zip(*(record[field]["value"] for field in ANCHORS), strict=True)
     rows = [[str(k), *map(_numbers, both)] for k, both in enumerate(ends)]
     return TextTable(heads, rows, left=frozenset({1, 2}))

@@ -50,14 +50,9 @@ class _Limits:
 
     def criteria(self, robot: str) -> Iterator[sl.Criterion]:
         """The criteria that the options state. Without --scene, the obstacles are those of the robot file `robot`."""
-        if self.reserve is not None:
-            yield sl.LeastMargin(self.reserve)
-        if self.max_sag is not None:
-            yield sl.MaximumSag(self.max_sag)
-        if self.min_stiffness is not None:
-            yield sl.LeastStiffness(self.min_stiffness)
-        if self.min_frequency is not None:
-            yield sl.LeastFrequency(self.min_frequency)
+        kinds = sl.LeastMargin, sl.MaximumSag, sl.LeastStiffness, sl.LeastFrequency
+        limits = self.reserve, self.max_sag, self.min_stiffness, self.min_frequency
+        yield from (kind(limit) for kind, limit in zip(kinds, limits, strict=True) if limit is not None)
         if self.clearance is not None:
             yield sl.Clearance(self.clearance, _obstacles(robot, self.scene))
         if self.in_frame:
