@@ -151,15 +151,37 @@ def test_a_bound_entry_sees_new_values_of_its_arrays() -> None:
         np.testing.assert_array_equal(one, other)
 
 
-def test_too_little_memory_is_an_error() -> None:
+def arguments_of_inverse() -> list[Any]:
+    """Arguments of `inverse_poses` for one pose; the last two are its first index and the index after it."""
     with recorded() as calls:
         robot = sl.load_robot("cogiro")
         sl.inverse(robot, sl.Pose.from_euler([0.2, -0.4, 2.4], 0.0, 0.0, 0.0))
     call = next(each for each in calls if each.symbol.startswith("sagline_inverse_poses"))
-    arguments = list(copied(call.before))
+    return list(copied(call.before))
+
+
+def test_a_bound_entry_takes_new_numbers() -> None:
+    arguments = arguments_of_inverse()
+    results = arguments[10][0]
+    results[:] = 0.0
+    call = bound(inverse_poses, *arguments, numbers=2)
+    references = sys.getrefcount(None)
+    assert [call(0, 0) for _ in range(1000)] == [None] * 1000
+    assert abs(sys.getrefcount(None) - references) < 500
+    assert not results.any()
+    call(np.int64(0), True)
+    assert results.all()
+    for bad in ((0,), (0, 1, 1), ("0", 1), (0.5, 1), (None, 1)):
+        with pytest.raises(TypeError, match="inverse_poses requires 2 numbers"):
+            call(*bad)
+
+
+def test_too_little_memory_is_an_error() -> None:
+    arguments = arguments_of_inverse()
     arguments[7] = (np.empty(10), arguments[7][1])
-    with pytest.raises(ValueError, match="inverse_poses"):
-        cast("Any", inverse_poses)(*arguments)
+    for call in (cast("Any", inverse_poses), lambda *given: bound(inverse_poses, *given)()):
+        with pytest.raises(ValueError, match="inverse_poses"):
+            call(*arguments)
 
 
 def test_an_entry_has_the_name_and_docstring_of_its_source() -> None:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import ctypes
-import operator
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -23,14 +22,10 @@ FUNCTIONS: Final = (  # functions of Python's stable interface, in the order of 
     *("PyObject_GetBuffer", "PyBuffer_Release", "PyTuple_Size", "PyTuple_GetItem", "PyFloat_AsDouble"),
     *("PyLong_AsLongLong", "PyObject_IsTrue", "PyErr_Occurred", "PyErr_Clear"),
     *("PyEval_SaveThread", "PyEval_RestoreThread"),
+    *("Py_IncRef", "PyFloat_FromDouble", "PyLong_FromLongLong", "PyBool_FromLong", "PyErr_Format"),
 )
-
-# letter of a format -> conversion of a number, and name of the number in its slot
-CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
-    "f": (float, "f"),
-    "i": (operator.index, "i"),
-    "?": (bool, "i"),
-}
+OBJECTS: Final = None, ValueError, TypeError  # objects of Python, in the order of `Python` in python.c
+FAST_CALL: Final = 0x80  # METH_FASTCALL
 
 
 class LibraryError(Exception):
@@ -48,9 +43,6 @@ class Slot(ctypes.Union):
     _fields_ = (("f", ctypes.c_double), ("i", ctypes.c_int64), ("p", ctypes.c_void_p))
 
 
-_CALL: Final = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)  # the call releases the global lock
-
-
 class _Row(ctypes.Structure):
     """A row of the table of entries."""
 
@@ -63,61 +55,67 @@ class _Row(ctypes.Structure):
     )
 
 
+class _Bound(ctypes.Structure):
+    """A row, the format and number of its last arguments, which may change, and its filled slots."""
+
+    _fields_ = (
+        ("entry", ctypes.c_void_p),
+        ("kinds", ctypes.c_char_p),
+        ("numbers", ctypes.c_int64),
+        ("slots", ctypes.c_void_p),
+    )
+
+
+class _Method(ctypes.Structure):
+    """Declaration of a function in C: `PyMethodDef`."""
+
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("call", ctypes.c_void_p),
+        ("flags", ctypes.c_int),
+        ("text", ctypes.c_char_p),
+    )
+
+
+_new_function: Final = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)(
+    ("PyCFunction_NewEx", ctypes.pythonapi)
+)
+
+
 class Entry:
     """A compiled kernel that Python calls, with one version per set of argument types."""
 
-    def __init__(self, name: str, rows: list[_Row], library: ctypes.PyDLL, python: Any) -> None:
-        """Store `rows`, the table rows of the kernel `name`. `library`, `python`: see `Library`."""
+    def __init__(self, name: str, rows: list[_Row], library: ctypes.PyDLL) -> None:
+        """Store `rows`, the table rows of the kernel `name`."""
         self.__name__ = name
         self._rows = [(row, ctypes.addressof(row)) for row in rows]
-        self._call, self._fill, self._python = library.sagline_call, library.sagline_fill, ctypes.addressof(python)
-        self._kept = python
+        self._call, self._fill = library.sagline_call, library.sagline_fill
+        self._method = _Method(name.encode(), ctypes.cast(library.sagline_bound, ctypes.c_void_p), FAST_CALL, None)
 
     def __call__(self, *arguments: object) -> object:
         """Run the kernel."""
         result = Slot()
         for row, address in self._rows:
-            code = self._call(self._python, address, arguments, ctypes.byref(result))
+            code = self._call(address, arguments, ctypes.byref(result))
             if code == 0:
                 return value_of(result, row.result)
             if code == SHORT_MEMORY:
                 raise _short_memory(self.__name__)
         raise self._wrong_types()
 
-    def bind(self, arguments: tuple[object, ...], numbers: int) -> Bound:
+    def bind(self, arguments: tuple[object, ...], numbers: int) -> Callable[..., object]:
         """Kernel that keeps `arguments`. The last `numbers` arguments may change at each call."""
         for row, address in self._rows:
             slots = (Slot * row.slots)()
-            if self._fill(self._python, address, arguments, slots) == 0:
-                return Bound(self.__name__, row, slots, numbers, arguments)
+            if self._fill(address, arguments, slots) == 0:
+                bound = _Bound(address, row.format[-1 - numbers : -1], numbers, ctypes.addressof(slots))
+                kept = ctypes.addressof(bound), bound, slots, arguments, self
+                return _new_function(ctypes.addressof(self._method), kept, None)
         raise self._wrong_types()
 
     def _wrong_types(self) -> TypeError:
         formats = " or ".join(row.format.decode() for row, _ in self._rows)
         return TypeError(f"arguments of {self.__name__} have other types than {formats} (see tools/translate/python.c)")
-
-
-class Bound:
-    """A compiled kernel with its arguments."""
-
-    __slots__ = ("_call", "_kept", "_kind", "_last", "_name", "_result", "_slots")
-
-    def __init__(self, name: str, row: _Row, slots: Any, numbers: int, arguments: object) -> None:
-        """Store the filled `slots`, and references to `arguments` so that they are not deleted."""
-        self._name, self._kind, self._call = name, row.result, _CALL(row.call)
-        self._result = Slot()
-        self._slots, self._kept = ctypes.addressof(slots), (arguments, slots)
-        kinds = row.format.decode()[-1 - numbers : -1]
-        last = slots[row.slots - numbers : row.slots]
-        self._last = [(slot, *CONVERSIONS[kind]) for slot, kind in zip(last, kinds, strict=True)]
-
-    def __call__(self, *numbers: float) -> object:
-        """Run the kernel with `numbers` as the values of the last arguments."""
-        for (slot, convert, member), number in zip(self._last, numbers, strict=True):
-            setattr(slot, member, convert(number))
-        if self._call(self._slots, ctypes.addressof(self._result)):
-            raise _short_memory(self._name)
-        return value_of(self._result, self._kind)
 
 
 def value_of(slot: Slot, kind: bytes) -> object:
@@ -145,10 +143,10 @@ class Library:
         if built_from != digest_of_kernels().encode():
             raise LibraryError("the library of compiled kernels is not built from the present sources", stale=True)
         pointers = [ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value for name in FUNCTIONS]
-        self._python = (ctypes.c_void_p * (len(FUNCTIONS) + 1))(*pointers, id(None))
-        pointer = ctypes.c_void_p
-        self._library.sagline_fill.argtypes = (pointer, pointer, ctypes.py_object, pointer)
-        self._library.sagline_call.argtypes = (pointer, pointer, ctypes.py_object, pointer)
+        python: Any = (ctypes.c_void_p * (len(FUNCTIONS) + len(OBJECTS))).in_dll(self._library, "sagline_python")
+        python[:] = [*pointers, *map(id, OBJECTS)]
+        self._library.sagline_fill.argtypes = (ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)
+        self._library.sagline_call.argtypes = (ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)
         self._rows: dict[str, list[_Row]] = {}
         self._entries: dict[str, Entry] = {}
         table = ctypes.addressof(_Row.in_dll(self._library, "sagline_entries"))
@@ -176,5 +174,5 @@ class Library:
         if name not in self._rows or not module.startswith("sagline.kernels."):
             return None
         if name not in self._entries:
-            self._entries[name] = Entry(name, self._rows[name], self._library, self._python)
+            self._entries[name] = Entry(name, self._rows[name], self._library)
         return self._entries[name]
