@@ -241,10 +241,8 @@ def _step_to(value: object, kind: type) -> str:
 
 
 def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
-    """Checked index along the first axis of a batch: an integer, a slice, or an array of integers or booleans.
-
-    shape: shape of the batch, () for a single entry; single: name of a single entry in the message.
-    """
+    """Checked index along the first axis of a batch: an integer, a slice, or an array of integers or booleans."""
+    # shape: shape of the batch, () for a single entry; single: name of a single entry in the message.
     if not shape:
         raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; use it directly.")
     if isinstance(index, slice):

@@ -46,12 +46,10 @@ def checked(
     infinite: bool = False,
     missing: bool = False,
 ) -> Array:
-    """Read-only, C-contiguous float64 copy of `value`; raises an error if `value` is not allowed.
-
-    The message contains `unit`. `shape` states the required lengths of the last axes; None allows any length or any
-    shape. Every value must exceed `above`. `missing` allows NaN. A read-only array with all these properties that owns
-    its memory, such as a result of sagline, is returned without a copy.
-    """
+    """Read-only, C-contiguous float64 copy of `value`; raises an error if `value` is not allowed."""
+    # The message contains `unit`. `shape` states the required lengths of the last axes; None allows any length or any
+    # shape. Every value must exceed `above`. `missing` allows NaN. A read-only array with all these properties that
+    # owns its memory, such as a result of sagline, is returned without a copy.
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
         _check_shape(array, item, shape)

@@ -28,19 +28,14 @@ def n(
     uncertainty: SupportsFloat | None = None,
     size: SupportsFloat = 0.0,
 ) -> str:
-    """Text of a number with its unit.
-
-    A number from 0.1 to 1000 keeps the unit. Any other number gets a prefix that makes it a number between 1 and 1000,
-    or a power of ten if no such prefix exists. The minus sign is U+2212. The space before a unit is a no-break space.
-
-    The argument `form` is a format of the digits, as in the function `format`. `unit` is a text such as "mm", "kg/m" or
-    "%", or "" for a dimensionless number. Two digits of the standard `uncertainty` are written in parentheses:
-    43.98(10) means 43.98 ± 0.10. If the value is a difference, `size` is the size of its operands; a value up to
-    `ROUNDING` times `size` is written as "0 (rounding)". A number that is not finite is written as "–".
-
-    Source:
-        ISO 80000-1:2022, 7.2 (prefixes); JCGM 100:2008, 7.2.2 (uncertainty in parentheses).
-    """
+    """Text of a number with its unit."""
+    # A number from 0.1 to 1000 keeps the unit. Any other number gets a prefix that makes it a number between 1 and
+    # 1000, or a power of ten if no such prefix exists. The minus sign is U+2212. The space before a unit is a no-break
+    # space. The argument `form` is a format of the digits, as in the function `format`. `unit` is a text such as "mm",
+    # "kg/m" or "%", or "" for a dimensionless number. Two digits of the standard `uncertainty` are written in
+    # parentheses: 43.98(10) means 43.98 ± 0.10. If the value is a difference, `size` is the size of its operands; a
+    # value up to `ROUNDING` times `size` is written as "0 (rounding)". A number that is not finite is written as "–".
+    # Source: ISO 80000-1:2022, 7.2 (prefixes); JCGM 100:2008, 7.2.2 (uncertainty in parentheses).
     number = float(value)
     if not isfinite(number):
         return "–"
@@ -59,10 +54,8 @@ def n(
 
 
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
-    """Text of a number with its standard error, rounded to two significant digits of the error: "512 ± 12 kN".
-
-    error: standard error in the unit, infinite or NaN if unknown; prefixed: False to omit the unit, as in a table.
-    """
+    """Text of a number with its standard error, rounded to two significant digits of the error: "512 ± 12 kN"."""
+    # error: standard error in the unit, infinite or NaN if unknown; prefixed: False to omit the unit, as in a table.
     number, own = float(value), float(error)
     if not (isfinite(number) and isfinite(own) and own > 0.0):
         text = n(number, ".6g", unit if prefixed else "")

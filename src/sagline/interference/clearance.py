@@ -91,11 +91,9 @@ class ClearanceRows:
         return np.where(lost, np.nan, found.min(axis=1)), pair
 
     def of_platform(self, pose: Pose, half: Array) -> Array:
-        """Upper bound (N,) [m] of the platform's distance from obstacles for all positions in a box around `pose`.
-
-        half: half edges of the box, (3,) [m]. The platform is replaced by a box that is smaller by `half`. At each
-            position, the smaller box is inside the platform. Meshes are omitted.
-        """
+        """Upper bound (N,) [m] of the platform's distance from obstacles for all positions in a box around `pose`."""
+        # half: half edges of the box, (3,) [m]. The platform is replaced by a box that is smaller by `half`. At each
+        # position, the smaller box is inside the platform. Meshes are omitted.
         first = len(self.pairs.parts)
         pairs = self.pairs.by_kernel
         pairs = pairs[(pairs >= first).all(axis=1) & (pairs == first).any(axis=1)] - first

@@ -289,10 +289,8 @@ class InverseKinematics(Kinematics):
         return BLOCK if (goals == goals[:1]).all() else 1
 
     def solve(self, *inputs: Value) -> tuple[Value, Value, Value]:
-        """Lengths (N, m), tensions (N, m), and results of the kernels (N, rows, m); NaN at an infeasible pose.
-
-        All samples have the target tensions of the first one.
-        """
+        """Lengths (N, m), tensions (N, m), and results of the kernels (N, rows, m); NaN at an infeasible pose."""
+        # All samples have the target tensions of the first one.
         pose, wrench, frame, platform, goal = inputs
         count, m = len(pose), self.cables
         shared = goal[0] if count else self.numpy.zeros(m)

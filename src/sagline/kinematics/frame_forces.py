@@ -108,10 +108,9 @@ def _weights(state: Equilibrium) -> tuple[Array, Array]:
 
 
 def _entry_tension(state: Equilibrium, winches: Winch) -> Array:
-    """Tensions [N] of the cables at the frame anchors, on the drum sides of the pulleys, (..., m); docs/model.md, 10.
-
-    Along an exact cable, T + T^2/(2 EA) - w z is constant; friction multiplies the tension at the exit point.
-    """
+    """Tensions [N] of the cables at the frame anchors, on the drum sides of the pulleys, (..., m)."""
+    # Along an exact cable, T + T^2/(2 EA) - w z is constant (docs/model.md, 10); friction multiplies the tension at the
+    # exit point.
     robot, cables, contact = state.one_robot, state.cables, state.contact
     assert contact is not None
     winding = 0.0 if contact.winding is None else contact.winding

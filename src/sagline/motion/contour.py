@@ -145,11 +145,9 @@ class _Timed(NamedTuple):
 
 
 def samples_along(blocks: Iterable[Moves], acceleration: float, rate: float, most: float) -> Iterator[Samples]:
-    """Samples of the motion along consecutive `blocks`, at the times 0, 1/rate, 2/rate, ... and at the end.
-
-    The first move starts at rest, and the last move ends at rest. `most`: limit of the time [s]; `OverflowError` with
-    the line of the program if a motion ends later.
-    """
+    """Samples of the motion along consecutive `blocks`, at the times 0, 1/rate, 2/rate, ... and at the end."""
+    # The first move starts at rest, and the last move ends at rest. `most`: limit of the time [s]; `OverflowError` with
+    # the line of the program if a motion ends later.
     start, taken, rests = 0.0, 0, np.zeros(1)
     for timed, final in _timed(_joined(blocks), acceleration):
         ends = start + np.cumsum(timed.duration)
@@ -225,11 +223,9 @@ def _rounded(chain: Moves) -> tuple[Moves, Moves]:
 
 
 def _timed(blocks: Iterable[Moves], acceleration: float) -> Iterator[tuple[_Timed, bool]]:
-    """Moves with their speeds; and True for the last block.
-
-    The speeds at the end of a block depend on the next block. Moves are held back until the speeds at their ends no
-    longer depend on later moves.
-    """
+    """Moves with their speeds; and True for the last block."""
+    # The speeds at the end of a block depend on the next block. Moves are held back until the speeds at their ends no
+    # longer depend on later moves.
     held: Moves | None = None
     entry = 0.0
     for block in blocks:

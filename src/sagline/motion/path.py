@@ -162,14 +162,11 @@ def _without_sign_changes(quaternion: Array) -> Array:
 
 
 def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
-    """Angular velocity [rad/s] and angular acceleration [rad/s^2] in world axes of a spline through quaternions.
-
-    The normalized quaternion has q' = (omega, 0) q / 2, and |q| = 1 at the samples. The derivatives of the spline
-    therefore give omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
-
-    RotationSpline of scipy is not used, because its accelerations at both ends are wrong, even with small steps: its
-    first and last velocities are means over the outermost steps.
-    """
+    """Angular velocity [rad/s] and angular acceleration [rad/s^2] in world axes of a spline through quaternions."""
+    # The normalized quaternion has q' = (omega, 0) q / 2, and |q| = 1 at the samples. The derivatives of the spline
+    # therefore give omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
+    # RotationSpline of scipy is not used, because its accelerations at both ends are wrong, even with small steps: its
+    # first and last velocities are means over the outermost steps.
     rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
     growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of |q|, which is not constant along a spline

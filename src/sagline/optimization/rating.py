@@ -164,10 +164,8 @@ class Rating:
         return np.concatenate(parts)
 
     def margins(self, cables: Array, rows: Array) -> Array:
-        """Margins (N,) [N] of R cable tables (R, m, CABLE_COLUMNS) at pose rows (N, POSE_COLUMNS), N/R rows per table.
-
-        The margin is -inf at a pose at which a frame anchor is inside the platform.
-        """
+        """Margins (N,) [N] of R cable tables (R, m, CABLE_COLUMNS) at N pose rows, N/R rows per table."""
+        # The margin is -inf at a pose at which a frame anchor is inside the platform.
         made = MarginRows(self._candidates.robot, self._wrenches, self._model, self._arm, cables)
         anchors = np.repeat(cables[..., : tables.FRAME_Z + 1], len(rows) // len(cables), axis=0)
         held = self._solid.holds_at(anchors, Pose._adopt(rows[:, :3], rows[:, 3:]))

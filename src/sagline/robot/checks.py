@@ -21,11 +21,9 @@ _SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
 
 
 def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
-    """Orthonormal rows (n, 6), one per free motion; a row selects a component of a wrench or twist in world axes.
-
-    A planar pattern needs `plane_normal`, the unit normal (3,) of its plane. The first two rows are the translations e1
-    and e2 with e1 x e2 = plane_normal; e1 is horizontal, and e2 points upward as steeply as the plane allows.
-    """
+    """Orthonormal rows (n, 6), one per free motion; a row selects a component of a wrench or twist in world axes."""
+    # A planar pattern needs `plane_normal`, the unit normal (3,) of its plane. The first two rows are the translations
+    # e1 and e2 with e1 x e2 = plane_normal; e1 is horizontal, and e2 points upward as steeply as the plane allows.
     if plane_normal is None:
         return _SPATIAL[pattern]
     rows = np.zeros((3, 6))
@@ -92,13 +90,11 @@ def cables(given: Cable, count: int) -> Cable:
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:
-    """Checked inertia about the center of mass [kg m^2], (3, 3): symmetric, without negative principal moments.
-
-    The moment about each axis of free rotation must be positive. A body with three free rotations must also satisfy the
-    triangle inequality: each principal moment is at most the sum of the two other moments. Moments about axes without
-    free rotation may be zero, because other tools write zeros. If no rotation is free, `given` may be None, which means
-    zeros.
-    """
+    """Checked inertia about the center of mass [kg m^2], (3, 3): symmetric, without negative principal moments."""
+    # The moment about each axis of free rotation must be positive. A body with three free rotations must also satisfy
+    # the triangle inequality: each principal moment is at most the sum of the two other moments. Moments about axes
+    # without free rotation may be zero, because other tools write zeros. If no rotation is free, `given` may be None,
+    # which means zeros.
     if given is None and pattern in ROTATING:
         step = f"The motion pattern {pattern} has a rotation; give the inertia."
         raise InvalidValueError("inertia", "missing", "a symmetric matrix of shape (3, 3)", step)

@@ -49,10 +49,8 @@ class Drums:
 
     @classmethod
     def of(cls, robot: Robot) -> Drums:
-        """Drums of a robot. The winches must have drum_radius and groove_pitch, and the cables a diameter.
-
-        Drums with several layers also need drum_width and cable_length. A drum_distance also requires cable_length.
-        """
+        """Drums of a robot. The winches must have drum_radius and groove_pitch, and the cables a diameter."""
+        # Drums with several layers also need drum_width and cable_length. A drum_distance also requires cable_length.
         winches, diameter = robot.winches, robot.cables.diameter
         names = ["drum_radius", "groove_pitch"]
         if winches is not None and (winches.layers > 1.0).any():
@@ -181,11 +179,9 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 
 
 def _layer_starts(winches: Winch, table: Array) -> Array:
-    """Lengths off the drum at which the layers begin [m].
-
-    A layer begins at the length of the cable minus the length on lower layers, minus the extra length between drum and
-    pulley due to the oblique direction of the cable.
-    """
+    """Lengths off the drum at which the layers begin [m]."""
+    # A layer begins at the length of the cable minus the length on lower layers, minus the extra length between drum
+    # and pulley due to the oblique direction of the cable.
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
     # if cable_length is unknown, zero turns are at length_zero
@@ -210,13 +206,11 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def drum_tension(state: Equilibrium) -> Array:
-    """Tension of the cables at the drum [N], (m,) or (N, m). Friction is included if the state has winding directions.
-
-    Along an exact cable without friction, T + T^2/(2 EA) - w z is constant; z is the height. In all other models, the
-    cable between pulley and drum has no weight, and the drum tension is the chord tension. A slack cable that leaves a
-    drum downward has a negative tension. A tension that would give a negative length is NaN. See docs/model.md, section
-    10.
-    """
+    """Tension of the cables at the drum [N], (m,) or (N, m), with friction if the state has winding directions."""
+    # Along an exact cable without friction, T + T^2/(2 EA) - w z is constant; z is the height. In all other models, the
+    # cable between pulley and drum has no weight, and the drum tension is the chord tension. A slack cable that leaves
+    # a drum downward has a negative tension. A tension that would give a negative length is NaN. See docs/model.md,
+    # section 10.
     robot, cables = state.robot, state.cables
     if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
         return locked(actual_routing(state)[-1])
@@ -260,10 +254,9 @@ def _at(item: str, sample: int, cable: int, samples: int) -> str:
 
 
 def drum_lever(robot: Robot, length: Array) -> Array:
-    """Lever arm: cable length per radian of drum rotation [m], for lengths off the drums (m,) or (N, m) [m].
-
-    The lever arm depends on the layer. Without drum data, the lever arm is drum_radius plus half of the cable diameter.
-    """
+    """Lever arm: cable length per radian of drum rotation [m], for lengths off the drums (m,) or (N, m) [m]."""
+    # The lever arm depends on the layer. Without drum data, the lever arm is drum_radius plus half of the cable
+    # diameter.
     winch = robot.winches
     if winch is None or winch.drum_radius is None:
         step = "Give it in the robot file, or with robot.replace(winches=Winch(drum_radius=...))."

@@ -232,11 +232,9 @@ def result_rows(robot: Robots) -> int:
 def cables_of_results(
     robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
 ) -> tuple[CableState, Contact | None]:
-    """States of the free spans at solved poses; contact with pulleys, or None without pulleys and dead lengths.
-
-    results: rows of `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: shape
-    of the poses, () or (N,).
-    """
+    """States of the free spans at solved poses; contact with pulleys, or None without pulleys and dead lengths."""
+    # results: rows of `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: shape
+    # of the poses, () or (N,).
     m = results.shape[2]
 
     def row(which: int) -> Array:

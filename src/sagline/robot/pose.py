@@ -24,11 +24,9 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def unit(vectors: Array) -> Array:
-    """Unit vectors along `vectors` (last axis); NaN for a zero vector.
-
-    A vector is unchanged if its length differs from 1 only by rounding errors, because loading and copying normalize
-    vectors again, and must not change values. If all lengths are 1, the given array itself is returned.
-    """
+    """Unit vectors along `vectors` (last axis); NaN for a zero vector."""
+    # A vector is unchanged if its length differs from 1 only by rounding errors, because loading and copying normalize
+    # vectors again, and must not change values. If all lengths are 1, the given array itself is returned.
     length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., np.newaxis]
     if (np.abs(length - 1.0) <= _ROUNDING).all():
         return vectors

@@ -33,11 +33,9 @@ def check_cable_count(robot: Robot, name: str | None = None, step: str = _FEWER_
 
 
 def check_reach(robot: Robot, pose: Pose, item: str) -> None:
-    """Refuse a batch in which poses differ by motions that the robot's motion pattern does not allow.
-
-    A platform without rotations may have any orientation, which must be constant. A planar platform may rotate only
-    about the normal of its plane, and its position along the normal must be constant. NaN is accepted.
-    """
+    """Refuse a batch in which poses differ by motions that the robot's motion pattern does not allow."""
+    # A platform without rotations may have any orientation, which must be constant. A planar platform may rotate only
+    # about the normal of its plane, and its position along the normal must be constant. NaN is accepted.
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
         return
@@ -58,10 +56,8 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
 
 
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
-    """Part of the rotation between the quaternion `other` (4,) and each pose that the motion pattern does not allow.
-
-    Returns sin(angle/2) times the axis of rotation, (N, 3); zero for a motion pattern that allows all motions.
-    """
+    """Part of the rotation between the quaternion `other` (4,) and each pose that the motion pattern does not allow."""
+    # Returns sin(angle/2) times the axis of rotation, (N, 3); zero for a motion pattern that allows all motions.
     own = np.atleast_2d(pose.quaternion)
     if robot.motion_pattern == "3R3T":
         return np.zeros((len(own), 3))
@@ -82,11 +78,9 @@ _FLAT: Final = 0.05  # largest distance below the top, relative to the robot's s
 
 
 def bounds(robot: Robot) -> tuple[Array, Array]:
-    """Lowest and highest corner [m], (3,) each, of a box around the robot: its frame, or the extent of its anchors.
-
-    The top of the frame is at the height of the highest anchors. If the frame size is not given and all frame anchors
-    are at the top, the box extends down to the floor or to the lowest pose of the test box.
-    """
+    """Lowest and highest corner [m], (3,) each, of a box around the robot: its frame, or the extent of its anchors."""
+    # The top of the frame is at the height of the highest anchors. If the frame size is not given and all frame anchors
+    # are at the top, the box extends down to the floor or to the lowest pose of the test box.
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     if robot.frame_size is not None:
         middle = 0.5 * (low + high)

@@ -72,11 +72,9 @@ def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
 
 
 def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
-    """Equilibrium in which lengths include guides and friction between exit points and drums.
-
-    winding: +1 winding in, -1 paying out, 0 at rest, (m,) or (N, m); None for no friction. The length is NaN for a
-    cable that is too slack for a catenary between guides. Without guides and friction, `state` itself is returned.
-    """
+    """Equilibrium in which lengths include guides and friction between exit points and drums."""
+    # winding: +1 winding in, -1 paying out, 0 at rest, (m,) or (N, m); None for no friction. The length is NaN for a
+    # cable that is too slack for a catenary between guides. Without guides and friction, `state` itself is returned.
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
     kept = None if winding is None else locked(np.array(np.broadcast_to(winding, state.cables.shape)))
@@ -132,10 +130,8 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
 
 
 def guide_forces(state: Equilibrium) -> Array:
-    """Forces [N] of the guided cables on frame anchors, guides and drums, world axes, (..., m, k + 1, 3).
-
-    The order is from the frame anchor to the drum. The robot must have k guides per cable.
-    """
+    """Forces [N] of the guided cables on frame anchors, guides and drums, world axes, (..., m, k + 1, 3)."""
+    # The order is from the frame anchor to the drum. The robot must have k guides per cable.
     robot, winches = state.one_robot, state.one_robot.winches
     assert winches is not None
     assert winches.guides is not None
@@ -213,11 +209,9 @@ def _straight_run(at: _ExitState, length: Array, rise: Array) -> tuple[Array, Ar
 def _guided_spans(
     at: _ExitState, winches: Winch, robot: Robot, model: CableModel, cable: Indices
 ) -> tuple[Array, Array, Array]:
-    """Unstrained length between pulley and drum [m], and tension at the drum [N], of cables with guides.
-
-    Also returns the forces on anchors, guides and drums (K, k + 1, 3) [N]. Tensions and bend angles depend on each
-    other, and are computed alternately until convergence.
-    """
+    """Unstrained length between pulley and drum [m], and tension at the drum [N], of cables with guides."""
+    # Also returns the forces on anchors, guides and drums (K, k + 1, 3) [N]. Tensions and bend angles depend on each
+    # other, and are computed alternately until convergence.
     assert winches.guides is not None
     # frame anchors A and guides, in the order toward the drum
     points = np.concatenate((winches.guides, robot.frame_anchors[:, None]), axis=1)[cable, ::-1]
@@ -253,11 +247,9 @@ def _guided_spans(
 
 
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
-    """Catenaries over the vectors `step` (K, 3) [m] with `tension` [N] at the platform-side ends; NaN if impossible.
-
-    If the chord tension grows, the tension at the end first decreases to a minimum and then increases. Catenaries with
-    a smaller end tension than this minimum do not exist.
-    """
+    """Catenaries over the vectors `step` (K, 3) [m] with `tension` [N] at the platform-side ends; NaN if impossible."""
+    # If the chord tension grows, the tension at the end first decreases to a minimum and then increases. Catenaries
+    # with a smaller end tension than this minimum do not exist.
     level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
     weight = 0.0 if model.weightless else cable.linear_density * gravity
     least = 1e-9 * cable.axial_stiffness

@@ -53,11 +53,9 @@ UNCERTAIN: Final[Mapping[str, _Uncertain]] = MappingProxyType(
 def deviations(
     given: Any, item: str, cables: int, *, low: float = -np.inf, above: float = -np.inf
 ) -> Mapping[str, Array]:
-    """Checked standard deviations of quantities in `UNCERTAIN`, each expanded to the shape of the quantity.
-
-    given: dictionary from quantity names to deviations (infinite if unknown). A deviation is one number, three numbers
-    for the axes x, y, z, or an array of the shape of the quantity. low, above: limits of the deviations.
-    """
+    """Checked standard deviations of quantities in `UNCERTAIN`, each expanded to the shape of the quantity."""
+    # given: dictionary from quantity names to deviations (infinite if unknown). A deviation is one number, three
+    # numbers for the axes x, y, z, or an array of the shape of the quantity. low, above: limits of the deviations.
     if not isinstance(given, Mapping):
         allowed = "names of fields and standard deviations"
         raise InvalidValueError(item, brief(given), allowed, 'Give {"frame_anchors": 0.005}, in SI.')

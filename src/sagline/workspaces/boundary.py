@@ -103,11 +103,9 @@ def boundary(
 
 
 def _components_of(grid: Grid, nodes: NDArray[np.int32], inner: Indices, faces: Indices, volumes: Array) -> Components:
-    """Components of a set, without a proof that they are separate.
-
-    Arguments: `grid`; `nodes`, the labels of its nodes, 1 and higher in the set; `inner` and `faces`, the inner nodes
-        and the triangles of the set's net; `volumes` (F,) [m^3] of the triangles.
-    """
+    """Components of a set, without a proof that they are separate."""
+    # Arguments: `grid`; `nodes`, the labels of its nodes, 1 and higher in the set; `inner` and `faces`, the inner nodes
+    # and the triangles of the set's net; `volumes` (F,) [m^3] of the triangles.
     count = int(nodes.max())
     vertices = nodes[tuple(inner.T)] - 1
     volume = np.bincount(vertices[faces[:, 0]], volumes, minlength=count)
@@ -123,11 +121,9 @@ INWARD: Final = 0.01  # distance between a vertex and the position at which its 
 
 
 def uncertain_volume(level: Level, surface: Surface, uncertainty: Array, cell: float) -> float:
-    """Volume [m^3] between the boundaries of two level functions that differ by `uncertainty`, (V,), at the vertices.
-
-    The slope at a vertex is computed with a position inside the set. cell: edge of a cell [m], which is also the
-    largest distance between the two boundaries.
-    """
+    """Volume [m^3] between the boundaries of two level functions that differ by `uncertainty` (V,) at vertices."""
+    # The slope at a vertex is computed with a position inside the set. cell: edge of a cell [m], which is also the
+    # largest distance between the two boundaries.
     k = np.flatnonzero(uncertainty > 0.0)
     if not len(k):
         return 0.0

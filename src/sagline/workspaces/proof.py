@@ -86,11 +86,9 @@ class Prover:
         self._statuses = np.zeros(robot.cable_count, dtype=np.int8)
 
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
-        """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline.
-
-        Arguments: `middle` (N, 3) and `half` (3,), centers and half edges of the boxes [m]; `rotations` (N, 3), None
-            for level; `turns`, () or (N,), largest angle between an orientation of a box and its rotation vector [rad].
-        """
+        """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline."""
+        # Arguments: `middle` (N, 3) and `half` (3,), centers and half edges of the boxes [m]; `rotations` (N, 3), None
+        # for level; `turns`, () or (N,), largest angle between an orientation of a box and its rotation vector [rad].
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle
         boxes[:, 6] = 1.0

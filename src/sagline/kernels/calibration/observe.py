@@ -217,12 +217,10 @@ def swivel_readings(
     memory: tuple[Array, Indices],
     found: Array,
 ) -> None:
-    """Directions of pulleys with swivel axes of any direction at N equilibria, and derivatives of the swivel angles.
-
-    The arguments are the same as in `observe`. `found` (N, m, SWIVEL_NUMBERS), to be filled: unit vector from the
-    axis to the center of the pulley; derivatives of the angle about the axis by the platform end [rad/m], and by the
-    cable's length, density, EA, pulley radius and dead length.
-    """
+    """Directions of pulleys with swivel axes of any direction at N equilibria, and derivatives of the swivel angles."""
+    # The arguments are the same as in `observe`. `found` (N, m, SWIVEL_NUMBERS), to be filled: unit vector from the
+    # axis to the center of the pulley; derivatives of the angle about the axis by the platform end [rad/m], and by the
+    # cable's length, density, EA, pulley radius and dead length.
     batch = platform.ForwardSamples(*given)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
@@ -297,20 +295,16 @@ def starting_lengths(
     memory: tuple[Array, Indices],
     length_out: Array,
 ) -> None:
-    """Fill the unstrained lengths off the drums [m] of cables that balance the platform with tensions near `tension`.
-
-    The chord tensions are changed as little as possible to balance the platform.
-
-    Args:
-        terms: Terms of the cable model.
-        freedom: Rows that select the free motions, (n, 6).
-        cables: Row of the cable_table, (m, CABLE_COLUMNS).
-        body: Row of the body_table.
-        poses: Pose rows (N, POSE_COLUMNS).
-        tension: Tensions at the frame ends [N], (N, m).
-        memory: Work arrays from `memory_for`, for the number of cables.
-        length_out: Filled, (N, m).
-    """
+    """Fill the unstrained lengths off the drums [m] that balance the platform with tensions near `tension`."""
+    # The chord tensions are changed as little as possible to balance the platform.
+    # terms: Terms of the cable model.
+    # freedom: Rows that select the free motions, (n, 6).
+    # cables: Row of the cable_table, (m, CABLE_COLUMNS).
+    # body: Row of the body_table.
+    # poses: Pose rows (N, POSE_COLUMNS).
+    # tension: Tensions at the frame ends [N], (N, m).
+    # memory: Work arrays from `memory_for`, for the number of cables.
+    # length_out: Filled, (N, m).
     model = model_of(terms)
     count, m = tension.shape
     n = freedom.shape[0]

@@ -16,11 +16,9 @@ from sagline.kernels.jit import formula, kernel
 
 @formula
 def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
-    """Force [N] of the wind on a line; it is normal to the line.
-
-    wind: velocity of the air [m/s], (3,); along: wind component along the line (x, y, z), divided by its length; drag:
-        force per square of the speed normal to the line [N s^2/m^2].
-    """
+    """Force [N] of the wind on a line; it is normal to the line."""
+    # wind: velocity of the air [m/s], (3,); along: wind component along the line (x, y, z), divided by its length;
+    # drag: force per square of the speed normal to the line [N s^2/m^2].
     nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
     size = drag * math.sqrt(nx * nx + ny * ny + nz * nz)
     return size * nx, size * ny, size * nz
@@ -313,11 +311,10 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 
 @kernel
 def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Insert a node in the element at the frame, one element length from its free end. The caller updates the counts.
-
-    Tension, mass and momentum, including the half element at the frame, do not change. Without cable between exit point
-    and drum, position and velocity are linear along the element, and the center of mass does not change.
-    """
+    """Insert a node in the element at the frame, one element length from its free end."""
+    # The caller updates the counts. Tension, mass and momentum, including the half element at the frame, do not change.
+    # Without cable between exit point and drum, position and velocity are linear along the element, and the center of
+    # mass does not change.
     rest, rate = row[REST], row[RATE]
     distance, left = _element_distance(place, count), rest - row[ELEMENT]
     share = 1.0 - row[ELEMENT] * (1.0 + _strain_at_exit(row, distance)) / (distance + TINY)
@@ -333,11 +330,9 @@ def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
 
 @kernel
 def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Merge the element at the frame with its neighbor and remove the node between both. The caller updates the counts.
-
-    The next node takes the momentum of the removed node. The half element at the frame moves with the entering cable,
-    so that its momentum is subtracted.
-    """
+    """Merge the element at the frame with its neighbor and remove the node between both."""
+    # The caller updates the counts. The next node takes the momentum of the removed node. The half element at the frame
+    # moves with the entering cable, so that its momentum is subtracted.
     element, rest, rate = row[ELEMENT], row[REST], row[RATE]
     whole = element + rest
     for c in range(3):

@@ -242,11 +242,9 @@ def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
 def _cable_stiffness_at(
     string: String, wave: _Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
 ) -> int:
-    """Fill K(omega) - K(0) of a cable's platform end, (d, d). Returns the number of natural frequencies below `omega`.
-
-    The natural frequencies are those of the cable with a fixed platform end. The result is SINGULAR if a joint is close
-    to a vibration node, and TOO_MANY if the number of elements is too large.
-    """
+    """Fill K(omega) - K(0) of a cable's platform end, (d, d). Returns the number of frequencies below `omega`."""
+    # The natural frequencies are those of the cable with a fixed platform end. The result is SINGULAR if a joint is
+    # close to a vibration node, and TOO_MANY if the number of elements is too large.
     c, system, phi = room[2 * STAGES : 3 * STAGES], room[: 2 * STAGES], room[3 * STAGES : 3 * STAGES + 4]
     rest, k = room[3 * STAGES + 4 :, :2], room[3 * STAGES + 4 :, 2:4]
     moved, whole = room[3 * STAGES :, 4:6], room[3 * STAGES :, 6:8]

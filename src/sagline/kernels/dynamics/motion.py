@@ -300,21 +300,18 @@ def cable_loads(
     now: Array,
     wrenches: Array,
 ) -> int:
-    """Fill the tensions at the frame ends and the wrench of all cables. Returns the number of cables without solution.
-
-    Args:
-        model: Cable model.
-        losses: loss_time [s] and air damping [N s/m^2].
-        cables: Rows of the cable_table, (m, CABLE_COLUMNS).
-        body: Row of the body_table. Its center of mass is the reference point of wrench and velocity.
-        data: Parameters of the drives, (DATA_ROWS, m); the height of the frame ends above the drums is used.
-        state: Pose row of the platform, velocity of the reference point and angular velocity in world axes, (13,).
-        rotation: Work array (3, 3).
-        rows: Rows of the cables with their lengths, (CABLE_ROWS, m). The solution is near the solution of the last
-            call if the parameters of that call are in the rows.
-        now: State of the drives with the rates of the lengths, (DRIVE_ROWS, m). The tensions are filled.
-        wrenches: Filled, (2, 6): wrench on the platform about the reference point, and the part of the losses.
-    """
+    """Fill tensions at the frame ends and the wrench of all cables. Returns the number of cables without solution."""
+    # model: Cable model.
+    # losses: loss_time [s] and air damping [N s/m^2].
+    # cables: Rows of the cable_table, (m, CABLE_COLUMNS).
+    # body: Row of the body_table. Its center of mass is the reference point of wrench and velocity.
+    # data: Parameters of the drives, (DATA_ROWS, m); the height of the frame ends above the drums is used.
+    # state: Pose row of the platform, velocity of the reference point and angular velocity in world axes, (13,).
+    # rotation: Work array (3, 3).
+    # rows: Rows of the cables with their lengths, (CABLE_ROWS, m). The solution is near the solution of the last
+    #     call if the parameters of that call are in the rows.
+    # now: State of the drives with the rates of the lengths, (DRIVE_ROWS, m). The tensions are filled.
+    # wrenches: Filled, (2, 6): wrench on the platform about the reference point, and the part of the losses.
     terms = Model(model[0], model[1], model[2], model[3], model[4])
     gravity = terms.gravity if terms.code == codes.CATENARY else 0.0
     wrench, lost = wrenches[0], wrenches[1]

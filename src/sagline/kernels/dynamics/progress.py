@@ -28,11 +28,9 @@ class CubicTable(NamedTuple):
 
 @formula
 def interpolate_table(course: CubicTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
-    """Fill values and rates (n,) of `course` at the time `now`. Returns the interval, which is searched from `at` on.
-
-    `shift`: small time offset. At an instant of the table, a negative shift selects the interval that ends there, and a
-    positive shift selects the interval that starts there.
-    """
+    """Fill values and rates (n,) of `course` at the time `now`. Returns the interval, searched from `at` on."""
+    # `shift`: small time offset. At an instant of the table, a negative shift selects the interval that ends there, and
+    # a positive shift selects the interval that starts there.
     times, last, moment = course.time, course.time.shape[0] - 1, now + shift
     while at < last - 1 and moment >= times[at + 1]:
         at += 1

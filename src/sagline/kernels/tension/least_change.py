@@ -262,12 +262,10 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
 
 @kernel
 def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionChange, memory: Memory) -> float:
-    """Change tensions within their ranges until the residual of the demand is least. Returns its length [N].
-
-    ranges: least and largest tensions, rows 0 and 1; change: start of the search, overwritten with the result. The
-        returned length [N] is the length of the soft residual: infinite if the tangents of the hard rows contradict the
-        ranges, and NaN if the hard rows are linearly dependent.
-    """
+    """Change tensions within their ranges until the residual of the demand is least. Returns its length [N]."""
+    # ranges: least and largest tensions, rows 0 and 1; change: start of the search, overwritten with the result. The
+    # returned length [N] is the length of the soft residual: infinite if the tangents of the hard rows contradict the
+    # ranges, and NaN if the hard rows are linearly dependent.
     n, m = demand.matrix.shape
     soft = demand.soft
     step, _ = _new_tangents(memory, n, m, n - soft)

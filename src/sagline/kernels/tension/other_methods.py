@@ -176,10 +176,8 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
 
 @glue
 def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
-    """Fix the cable with the largest violation at its limit, distribute the rest, and repeat while limits are violated.
-
-    The tensions change in place, by orthogonal steps in the null space. A cable that was fixed remains fixed.
-    """
+    """Fix the cable with the largest violation at its limit, distribute the rest, and repeat while one is violated."""
+    # The tensions change in place, by orthogonal steps in the null space. A cable that was fixed remains fixed.
     r, m = null.shape
     held, memory = block(memory, r + 1, r)
     triangle, memory = block(memory, r + 1, r + 1)

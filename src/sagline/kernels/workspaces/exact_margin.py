@@ -155,10 +155,8 @@ def _write_value(margin: Array, exact: float, error: float) -> None:
 
 @glue
 def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, load: Array, memory: Memory) -> float:
-    """Margin with exact sag forces from the tensions where the load meets the facet. NaN if the load misses the facet.
-
-    The tensions follow from the secants. If the bounds are narrow, errors of the tensions have a second-order effect.
-    """
+    """Margin with exact sag forces from the tensions where the load meets the facet. NaN if it misses the facet."""
+    # The tensions follow from the secants. If the bounds are narrow, errors of the tensions have a second-order effect.
     columns, y, bands = facet.columns, facet.direction, facet.bands
     n, m = platform.freedom.shape[0], columns.shape[1]
     matrix, rest = block(memory, n, n)

@@ -59,12 +59,10 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
 
 @formula
 def _from_secant(cables: Cables, i: int, low: float, high: float) -> tuple[float, float]:
-    """Lower bound (<= 0) and upper bound (>= 0) [N] of sag force minus secant between the chord tensions `low`, `high`.
-
-    The sag force of an inextensible cable is a sum of convex functions of the tension. Only the term wD/2 sin phi (X/3
-    - ...) is concave if the platform end is below the frame end. The secant of 1/tau is above 1/tau by at most
-    (1/sqrt(low) - 1/sqrt(high))^2. The bounds held for two million random cables with X <= 10 and e <= 10.
-    """
+    """Lower bound (<= 0) and upper bound (>= 0) [N] of sag force minus secant between the tensions `low`, `high`."""
+    # The sag force of an inextensible cable is a sum of convex functions of the tension. Only the term wD/2 sin phi
+    # (X/3 - ...) is concave if the platform end is below the frame end. The secant of 1/tau is above 1/tau by at most
+    # (1/sqrt(low) - 1/sqrt(high))^2. The bounds held for two million random cables with X <= 10 and e <= 10.
     half_weight = cables.half_weight[i]
     if half_weight == 0.0:
         return 0.0, 0.0
