@@ -33,10 +33,7 @@ class CalibrationStatus(Status):
         "found, but the readings contradict the model or the deviations: check fixed parameters, residuals and "
         "outliers, and do not trust the standard errors",
     )
-    NOT_CONVERGED = (
-        2,
-        "not converged: check the log, and give better initial values or fewer unknowns",
-    )
+    NOT_CONVERGED = (2, "not converged: check the log, and give better initial values or fewer unknowns")
 
 
 class Omission(Status):

@@ -291,12 +291,7 @@ def _no_readings(lengths: Array) -> Readings:
 
 
 def _observed(
-    machine: MachineTerms,
-    readings: Readings,
-    slopes: Array,
-    poses: Array,
-    lengths: Array,
-    direction: Array | None,
+    machine: MachineTerms, readings: Readings, slopes: Array, poses: Array, lengths: Array, direction: Array | None
 ) -> WhitenedRows:
     """The whitened readings that the kernel knows."""
     count, m = lengths.shape

@@ -143,12 +143,7 @@ class ForwardRows(NamedTuple):
         return np.isin(self.pose_status, STABLE)
 
     def solution(
-        self,
-        robot: Robots,
-        model: CableModel,
-        load: Array,
-        shape: tuple[int, ...],
-        covariance: Array | None = None,
+        self, robot: Robots, model: CableModel, load: Array, shape: tuple[int, ...], covariance: Array | None = None
     ) -> ForwardSolution:
         """Result of `forward` with the shape `shape`: () or (N,). `load`: (6,) or (N, 6). `covariance`: (N, 6, 6)."""
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))

@@ -53,11 +53,7 @@ class Path(Shown, Tabular):
             raise _length_error("pose", self.pose.shape, clock.size)
         rests = None if self.rests is None else _checked_rests(self.rests, clock)
         set_fields(self, time=clock, rests=rests)
-        for name, unit in (
-            ("twist", "m/s or rad/s"),
-            ("twist_rate", "m/s^2 or rad/s^2"),
-            ("jerk", "m/s^3 or rad/s^3"),
-        ):
+        for name, unit in (("twist", "m/s or rad/s"), ("twist_rate", "m/s^2 or rad/s^2"), ("jerk", "m/s^3 or rad/s^3")):
             if name == "jerk" and self.jerk is None:
                 continue
             array = checked(getattr(self, name), name, unit, shape=(None, 6))

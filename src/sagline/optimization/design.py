@@ -157,13 +157,7 @@ class _Ledger:
     continued search therefore gives the same result as a search without interruption.
     """
 
-    def __init__(
-        self,
-        request: Request,
-        candidates: Candidates,
-        evaluations: int,
-        progress: Progress | None,
-    ) -> None:
+    def __init__(self, request: Request, candidates: Candidates, evaluations: int, progress: Progress | None) -> None:
         """Prepare the rating, and reject goals that have no finite value for the initial robot."""
         self._request, self._candidates = request, candidates
         self.record: DesignFolder | None = None

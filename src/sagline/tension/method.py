@@ -21,11 +21,7 @@ if TYPE_CHECKING:
     from sagline.kernels.inverse.poses import DistributionTerms, LimitTerms, ModelTerms
 
 Variable = Literal["chord", "horizontal", "frame_end"]
-VARIABLES = {
-    "chord": codes.CHORD_TENSION,
-    "horizontal": codes.HORIZONTAL_TENSION,
-    "frame_end": codes.FRAME_END_TENSION,
-}
+VARIABLES = {"chord": codes.CHORD_TENSION, "horizontal": codes.HORIZONTAL_TENSION, "frame_end": codes.FRAME_END_TENSION}
 
 # number of rows of the array of cable preferences
 ROOT_WEIGHT, GOAL = 0, 1  # rows: square root of a cable's weight in the sum of squares; target tension [N]

@@ -58,11 +58,7 @@ class Boundary(Result):
 
 
 def boundary(
-    level: Level,
-    low: ArrayLike,
-    high: ArrayLike,
-    cells: int | tuple[int, int, int] = 32,
-    refine: bool | int = True,
+    level: Level, low: ArrayLike, high: ArrayLike, cells: int | tuple[int, int, int] = 32, refine: bool | int = True
 ) -> Boundary:
     """Boundary, in a box [m], of the set in which `level`, a function of positions (N, 3) [m], is nonnegative."""
     # `level` may have jumps and infinite values, but not NaN. The function is evaluated at the nodes of a grid. `cells`

@@ -227,13 +227,7 @@ def _add_force_change(space: CalibrationArrays, i: int, at: int, scale: float, f
 
 @kernel
 def _add_parameter_change(
-    sought: Unknowns,
-    row: int,
-    i: int,
-    gain: float,
-    change: Triple,
-    alone: float,
-    space: CalibrationArrays,
+    sought: Unknowns, row: int, i: int, gain: float, change: Triple, alone: float, space: CalibrationArrays
 ) -> None:
     """Add the effects of a parameter of cable `i` to a column: on its platform-end force and its frame-end tension."""
     at = sought.where[row, i]

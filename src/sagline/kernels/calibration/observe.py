@@ -212,10 +212,7 @@ def observe(
 
 @entry
 def swivel_readings(
-    model: platform.ForwardTerms,
-    given: platform.SampleArrays,
-    memory: tuple[Array, Indices],
-    found: Array,
+    model: platform.ForwardTerms, given: platform.SampleArrays, memory: tuple[Array, Indices], found: Array
 ) -> None:
     """Directions of pulleys with swivel axes of any direction at N equilibria, and derivatives of the swivel angles."""
     # The arguments are the same as in `observe`. `found` (N, m, SWIVEL_NUMBERS), to be filled: unit vector from the
