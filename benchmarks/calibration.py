@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.calibration.calibrate import active_sensors
+from sagline.calibration.calibrate import _active_sensors
 from sagline.calibration.least_squares import best_step, evaluate_step
 from sagline.calibration.parameters import parameters_of, with_values
 from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, start_of
@@ -31,7 +31,7 @@ MILLION = 1_000_000
 
 def problem_of(log: sl.WinchLog) -> FitProblem:
     """Unknowns of a calibration of CoGiRo with a log."""
-    sensors = active_sensors(log)
+    sensors = _active_sensors(log)
     return FitProblem(
         COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), ReadingsTable.of(log)
     )

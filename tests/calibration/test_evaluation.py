@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline import dump_robot
-from sagline.calibration.evaluation import provenance_of
+from sagline.calibration.evaluation import _provenance_of
 from sagline.calibration.parameters import KINDS, parameters_of
 from tests.calibration.machines import sensors, with_drums
 
@@ -20,7 +20,7 @@ def test_every_number_has_the_standard_error_of_its_parameter(shared: bool, coun
     parameters = parameters_of(robot, unknowns, sensors(), counted=counted)
     errors = 1.0 + np.arange(float(len(parameters.names)))
     status = sl.CalibrationStatus.FOUND
-    made = provenance_of(parameters, errors, status, "winches.csv", "2026-03-01")
+    made = _provenance_of(parameters, errors, status, "winches.csv", "2026-03-01")
     kept = robot.replace(calibration=made).calibration
     assert kept is not None
     outside = {"measuring_frame", "length_scale", "clock_offset", "swivel_zero", "inertia", "target"}  # of the robot
@@ -43,5 +43,5 @@ def test_doubtful_results_are_noted() -> None:
     robot = sl.load_robot("cogiro")
     parameters = parameters_of(robot, ["mass"], sensors(), counted=False)
     for status in (sl.CalibrationStatus.DOUBTFUL, sl.CalibrationStatus.NOT_CONVERGED):
-        made = provenance_of(parameters, np.ones(1), status, "", "2026-03-01")
+        made = _provenance_of(parameters, np.ones(1), status, "", "2026-03-01")
         assert made.note == status.text

@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import Direction
-from sagline.calibration.identifiability import append_rows, gauge_of, numerical_rank
+from sagline.calibration.identifiability import _numerical_rank, append_rows, gauge_of
 from sagline.calibration.observations import MachineTerms, predicted_rows
 from sagline.calibration.parameters import KINDS, Parameters, PriorUnits
 from sagline.core.arrays import Array
@@ -257,4 +257,4 @@ def test_row_blocks_give_the_same_triangular_factor() -> None:
     ],
 )
 def test_the_gap_between_identifiable_and_unidentifiable_directions(values: list[float], count: int) -> None:
-    assert numerical_rank(np.array(values)) == count
+    assert _numerical_rank(np.array(values)) == count

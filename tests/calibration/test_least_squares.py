@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.calibration.calibrate import active_sensors
-from sagline.calibration.least_squares import evaluate_step, predict_state, solve
+from sagline.calibration.calibrate import _active_sensors
+from sagline.calibration.least_squares import _predict_state, evaluate_step, solve
 from sagline.calibration.log import load_cells_of
 from sagline.calibration.parameters import parameters_of, with_values
 from sagline.calibration.problem import Fit, FitProblem, ReadingsTable, SearchState, start_of
@@ -22,7 +22,7 @@ UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 
 
 def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot) -> FitProblem:
-    sensors = active_sensors(made.log)
+    sensors = _active_sensors(made.log)
     parameters = parameters_of(nominal, unknowns, sensors, counted=made.log.counts is not None)
     return FitProblem(nominal, sl.Catenary(), sensors, parameters, ReadingsTable.of(made.log))
 
@@ -156,7 +156,7 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
     before = SearchState(problem.prior, problem.machine_at(problem.prior), lengths, reference.pose_rows(pose))
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
     after, part = problem.machine_at(problem.prior + step), slice(0, len(lengths))
-    found, starts = predict_state(problem, before, None, step, after, problem.reported_lengths(after, part), part)
+    found, starts = _predict_state(problem, before, None, step, after, problem.reported_lengths(after, part), part)
     rest = sl.forward(after.robot, found, sl.Pose.from_quaternion(starts[:, :3], starts[:, 3:]), model)
     assert rest.stable.all()
     ended = reference.pose_rows(rest.pose)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from sagline.calibration.observations import MachineTerms
 from sagline.calibration.parameters import parameters_of, with_values
-from sagline.calibration.result import motion_slopes
+from sagline.calibration.result import _motion_slopes
 from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of, pose_rows
 from tests.calibration.synthetic import log_of, true_robot, with_drums
@@ -215,7 +215,7 @@ def test_the_effect_of_stiffness_differs_between_counts_and_lengths(counted: boo
     parameters = parameters_of(robot, ["axial_stiffness"], sensors, counted=counted)
     plan = sl.inverse(robot, commanded("drums")[0])
     lengths = np.asarray(plan.state.unstrained_length)[None]
-    by_values, _ = motion_slopes(
+    by_values, _ = _motion_slopes(
         MachineTerms.of(robot, sl.Catenary(), parameters, sl.Sensors()), pose_rows(plan.state.pose), lengths
     )
     moved = by_values[0, :3]

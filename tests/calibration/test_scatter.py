@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 import sagline as sl
-from sagline.calibration.findings import variance_factors
+from sagline.calibration.findings import _variance_factors
 from sagline.core.arrays import Array
 from tests.calibration.four_cables import CELL_NOISE, LENGTH_NOISE, drawn_robot, log_of_twin, twin_of
 from tests.calibration.synthetic import log_of, true_robot
@@ -40,7 +40,7 @@ def test_the_ratios_have_the_largest_likelihood_by_its_definition() -> None:
     misfit = rows @ np.linalg.cholesky(prior) @ rng.normal(size=6) + np.einsum(
         "nij,nj->ni", noise, true * rng.normal(size=(30, 5))
     )
-    factors, errors, redundancy = variance_factors(rows, noise, misfit, root, GROUPS)
+    factors, errors, redundancy = _variance_factors(rows, noise, misfit, root, GROUPS)
     given = (rows, noise, misfit, prior)
     best = minimize(minus_log_likelihood, np.zeros(2), given).x
     np.testing.assert_allclose(np.log(factors), best, atol=0.02)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.calibration.screening import lengths_of, reading_count, screen
+from sagline.calibration.screening import _lengths_of, reading_count, screen
 from sagline.core.arrays import Array
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums
 from tests.refusal import refused
@@ -46,9 +46,9 @@ def test_every_row_of_a_faultless_log_is_kept(faultless_log: Synthetic) -> None:
 def test_lengths_are_those_of_the_counts(faultless_log: Synthetic) -> None:
     counts = faultless_log.log.counts
     assert counts is not None
-    np.testing.assert_array_equal(lengths_of(ROBOT, faultless_log.log), sl.lengths_from_counts(ROBOT, counts))
+    np.testing.assert_array_equal(_lengths_of(ROBOT, faultless_log.log), sl.lengths_from_counts(ROBOT, counts))
     lengths = faultless_log.log.replace(counts=None, unstrained_length=faultless_log.length)
-    assert lengths_of(ROBOT, lengths) is lengths.unstrained_length
+    assert _lengths_of(ROBOT, lengths) is lengths.unstrained_length
 
 
 def test_informative_readings_are_counted(faultless_log: Synthetic) -> None:

@@ -9,11 +9,11 @@ import pytest
 import sagline as sl
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.calibration.summary import (
+    _faulty_sensors,
+    _row_ranges,
     anchor_covariance,
     calibration_text,
-    faulty_sensors,
     relative_covariance,
-    row_ranges,
 )
 from sagline.core.arrays import Array
 from tests.calibration.made_up import MOTIONS, STEP, made_up, motions, parameters
@@ -196,9 +196,9 @@ def test_the_text_has_80_columns_and_is_complete(found: sl.Calibration, count: i
 
 
 def test_consecutive_rows_are_printed_as_a_range() -> None:
-    assert row_ranges([3]) == "row 3"
-    assert row_ranges([3, 17, 18, 19, 40]) == "rows 3, 17 to 19, 40"
-    assert row_ranges(range(0, 2000, 2)).endswith("14 and 992 more")
+    assert _row_ranges([3]) == "row 3"
+    assert _row_ranges([3, 17, 18, 19, 40]) == "rows 3, 17 to 19, 40"
+    assert _row_ranges(range(0, 2000, 2)).endswith("14 and 992 more")
 
 
 def test_a_correlation_has_ones_and_the_signs_of_the_covariance(found: sl.Calibration) -> None:
@@ -272,7 +272,7 @@ def test_a_load_cell_with_many_outliers_is_named() -> None:
     cells[::4, 3] *= 1.4
     cells[7, 5] += 300.0
     found = sl.calibrate(robot, log.replace(load_cells=cells), ("mass",), folds=0)
-    (name, own), *others = faulty_sensors(found).items()
+    (name, own), *others = _faulty_sensors(found).items()
     assert name == ("load cell", 3)
     assert not others
     assert {one.row for one in own} <= set(range(0, 60, 4))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import sagline as sl
 from sagline.core.arrays import Array, locked
-from sagline.kinematics.forward import outside_limits
+from sagline.kinematics.forward import _outside_limits
 from sagline.kinematics.forward_rows import solve_forward_rows
 from tests.kinematics.feasible import box_poses, feasible_plan, moved, pose_rows
 from tests.refusal import refused
@@ -156,9 +156,9 @@ def test_a_search_judges_each_sample_by_the_limits_and_cables_of_its_robot(limit
     # limits 5 % beside the tensions of each robot exclude the requested number of cables
     low = [1.05 * row[k] for row, k in zip(tension, (0, 1, 2, 0, 0, 3), strict=True)]
     robots = [robot.replace(tension_min=value) for robot, value in zip(robots, low, strict=True)]
-    singles = [outside_limits(robot, sl.Catenary(), found.part(np.array([i])))[0] for i, robot in enumerate(robots)]
+    singles = [_outside_limits(robot, sl.Catenary(), found.part(np.array([i])))[0] for i, robot in enumerate(robots)]
     assert len(set(singles)) > 2
-    np.testing.assert_array_equal(outside_limits(tuple(robots), sl.Catenary(), found), singles)
+    np.testing.assert_array_equal(_outside_limits(tuple(robots), sl.Catenary(), found), singles)
 
 
 def test_straight_cables_are_fitted_robot_by_robot() -> None:

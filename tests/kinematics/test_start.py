@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.core.arrays import locked
-from sagline.kinematics.forward import centered_positions, outside_limits, start_quaternions, starting_positions
+from sagline.kinematics.forward import _outside_limits, _starting_positions, centered_positions, start_quaternions
 from sagline.kinematics.forward_rows import solve_forward_rows
 from tests.kinematics.feasible import pose_rows
 
@@ -20,7 +20,7 @@ def test_the_platform_starts_below_the_middle_of_the_frame_by_a_tenth_of_its_cab
     for rotation in (Rotation.identity(), turned):
         quaternion = np.array(rotation.as_quat())
         ends = COGIRO.platform_anchors @ rotation.as_matrix().T
-        away = starting_positions(COGIRO, lengths, quaternion) + ends.mean(axis=0) - COGIRO.frame_anchors.mean(axis=0)
+        away = _starting_positions(COGIRO, lengths, quaternion) + ends.mean(axis=0) - COGIRO.frame_anchors.mean(axis=0)
         np.testing.assert_allclose(away, [(0.0, 0.0, -0.6), (0.0, 0.0, -2.0), (0.0, 0.0, -0.1)], atol=1e-12)
         found = centered_positions(COGIRO, quaternion) + ends.mean(axis=0)
         np.testing.assert_allclose(found, COGIRO.frame_anchors.mean(axis=0), atol=1e-12)
@@ -30,11 +30,11 @@ def test_a_platform_in_a_level_plane_starts_in_it() -> None:
     level = sl.Robot("table", [(1, 0, 0), (-1, 1, 0), (0, -1, 0)], np.zeros((3, 3)), sl.Cable(0.01, 1e4), 1.0,
                      motion_pattern="2T", plane_normal=(0.0, 0.0, 1.0))  # fmt: skip
     np.testing.assert_allclose(
-        starting_positions(level, np.ones((1, 3)), LEVEL), centered_positions(level, LEVEL)[None], atol=1e-15
+        _starting_positions(level, np.ones((1, 3)), LEVEL), centered_positions(level, LEVEL)[None], atol=1e-15
     )
     upright = level.replace(plane_normal=(0.0, 1.0, 0.0))
     np.testing.assert_allclose(
-        starting_positions(upright, np.ones((1, 3)), LEVEL) - centered_positions(upright, LEVEL), [(0.0, 0.0, -0.1)]
+        _starting_positions(upright, np.ones((1, 3)), LEVEL) - centered_positions(upright, LEVEL), [(0.0, 0.0, -0.1)]
     )
 
 
@@ -66,4 +66,4 @@ def test_violated_limits_are_counted_for_the_limited_tension(limits_of: str, mod
     found = solve_forward_rows(robot, model, plan.unstrained_length[None], pose_rows(pose), locked(np.zeros((1, 6))))
     # a chord tension is below the interval and a frame-end tension above it; without weight both are equal
     expected = 2 if limits_of == "frame_end" and not isinstance(model, sl.Elastic) else 3
-    assert outside_limits(robot, model, found).tolist() == [expected]
+    assert _outside_limits(robot, model, found).tolist() == [expected]

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 
 import sagline as sl
-from sagline.optimization.design import PENALTY, costs_of, pareto_front
+from sagline.optimization.design import PENALTY, _pareto_front, costs_of
 from tests.optimization.pair import UNDER, apart, pair
 from tests.tiers import extended
 
@@ -16,7 +16,7 @@ def test_a_front_contains_the_nondominated_candidates() -> None:
     random = np.random.default_rng(5)
     for size in (1, 2, 30, 200):
         costs = random.integers(0, 12, (size, 3)).astype(float)
-        found = set(pareto_front(costs).tolist())
+        found = set(_pareto_front(costs).tolist())
         beaten = [((costs <= own).all(axis=1) & (costs < own).any(axis=1)).any() for own in costs]
         assert {tuple(costs[k]) for k in found} == {tuple(c) for c, b in zip(costs, beaten, strict=True) if not b}
         assert len(found) == len({tuple(costs[k]) for k in found})

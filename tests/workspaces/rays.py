@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
-from sagline.workspaces.grid import Brackets, Level, brackets, crossings, crossings_of, distance_to_box, level_values
+from sagline.workspaces.grid import Brackets, Level, _crossings_of, brackets, crossings, distance_to_box, level_values
 from sagline.workspaces.surface import Surface
 
 ITERATIONS: Final = 100  # facets that limit consecutive parts of a ray: three are usual
@@ -184,7 +184,7 @@ def _roots(facet_level: FacetLevel, facet: Array, outer: Array, at_outer: Array,
     def values(n: Indices, positions: Array) -> Array:
         return facet_level(facet[k[n]], positions)
 
-    found = crossings_of(values, centers[k], outer[k], at_center[k], at_outer[k], precision=1e-9)
+    found = _crossings_of(values, centers[k], outer[k], at_center[k], at_outer[k], precision=1e-9)
     share = np.zeros(len(outer))
     share[k] = found
     return share

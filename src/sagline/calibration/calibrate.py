@@ -138,7 +138,7 @@ def calibrate(
         log, fit_log = (one.replace(load_cells=None, swivel=None, frequency=None) for one in (log, fit_log))
     if straight and fit_log.rotation is None:
         log, fit_log = _with_assumed_rotations(robot, model, log, fit_log, wanted)
-    sensors = active_sensors(fit_log)
+    sensors = _active_sensors(fit_log)
     asked = _with_relative_lengths(log, checked_unknowns(wanted, sensors, counted=counted_log, straight=straight))
     parameters = parameters_of(robot, asked, sensors, counted=counted_log)
     more = fit_log.readings.size - len(fit_log) * len(robot.freedom) if straight else 0
@@ -176,7 +176,7 @@ def _without_inertia(log: WinchLog, moving: Flags) -> WinchLog:
     return log if log.load_cells is None else log.replace(load_cells=np.where(moving[:, None], np.nan, log.load_cells))
 
 
-def active_sensors(log: WinchLog) -> Sensors:
+def _active_sensors(log: WinchLog) -> Sensors:
     """Sensors with at least one reading in a log."""
     readings = ((deviation, getattr(log, name)) for name, deviation in READINGS.items())
     return log.sensors.replace(**{name: None for name, read in readings if read is None or np.isnan(read).all()})

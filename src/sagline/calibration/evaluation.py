@@ -53,7 +53,7 @@ def calibration_of(
     triangle = factor[:count, :count]
     values = parameters.external(numbers)
     gauge = gauge_of(triangle, parameters, values, machine.robot, machine.sensors)
-    covariance, rank = covariance_of(problem, triangle, machine.slopes)
+    covariance, rank = _covariance_of(problem, triangle, machine.slopes)
     criticisms: tuple[Criticism, ...] = ()
     if len(wider.parameters.names) > count:
         considered, criticisms = _criticism(problem, wider, fit, factor, covariance)
@@ -91,7 +91,7 @@ def calibration_of(
         date=date,
     )
     status = _status(fit, kept, result)
-    provenance = provenance_of(parameters, result.standard_error, status, source, date)
+    provenance = _provenance_of(parameters, result.standard_error, status, source, date)
     return replace(result, status=status, robot=machine.robot.replace(calibration=provenance))
 
 
@@ -111,7 +111,7 @@ def _status(fit: Fit, kept: Flags, result: Calibration) -> CalibrationStatus:
     return CalibrationStatus.DOUBTFUL if doubtful else CalibrationStatus.FOUND
 
 
-def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:
+def _covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:
     """Covariance (P, P) of the values, and its rank; the variance of an unobserved value without prior is infinite."""
     scale = problem.scale
     _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, problem.parameters.prior_root * scale))
@@ -138,7 +138,7 @@ def _is_doubtful(chi_squared: float, free: int, readings: NDArray[np.integer], *
     return bool(chdtrc(free, chi_squared + cut) < DOUBTFUL and ratio > TOLERATED)
 
 
-def provenance_of(
+def _provenance_of(
     parameters: Parameters, standard_error: Array, status: CalibrationStatus, log: str, date: str
 ) -> Provenance:
     """Provenance of a calibrated robot with log, date (ISO 8601) and the standard errors (P,) of the values."""

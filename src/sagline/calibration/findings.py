@@ -231,7 +231,7 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
         if np.array_equal(before, used):
             break
         problem = _linear_problem(found, used, stated)
-        factors, errors, redundancy = variance_factors(*problem, [one for *_, one in groups])
+        factors, errors, redundancy = _variance_factors(*problem, [one for *_, one in groups])
         ratios |= {quantity: float(np.sqrt(factor)) for (quantity, *_), factor in zip(groups, factors, strict=True)}
     deviations = []
     for (quantity, cable, one), factor, error, number in zip(groups, factors, errors, redundancy, strict=True):
@@ -292,7 +292,7 @@ def _units(missing: Flags) -> Array:
     return np.asarray(missing[:, :, None] * np.eye(missing.shape[1]))
 
 
-def variance_factors(
+def _variance_factors(
     rows: Array, noise: Array, misfit: Array, root: Array, groups: Sequence[Indices]
 ) -> tuple[Array, Array, Array]:
     """Estimated variances divided by stated variances, for groups of errors, by restricted maximum likelihood."""

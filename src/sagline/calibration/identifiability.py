@@ -47,12 +47,12 @@ def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
     scaled = triangle[:, frame.free] * frame.scale[frame.free]
     _, values, rows = np.linalg.svd(scaled, full_matrices=True)
     values = np.concatenate((values, np.zeros(len(rows) - len(values))))
-    vectors = np.zeros((len(frame.scale), len(rows) - numerical_rank(values)))
-    vectors[frame.free] = rows[numerical_rank(values) :].T
+    vectors = np.zeros((len(frame.scale), len(rows) - _numerical_rank(values)))
+    vectors[frame.free] = rows[_numerical_rank(values) :].T
     return vectors
 
 
-def numerical_rank(values: Array) -> int:
+def _numerical_rank(values: Array) -> int:
     """Number of singular values before the widest gap near `OPEN`; later values are only rounding errors."""
     largest = values[0] if values.size else 0.0
     if largest == 0.0:

@@ -101,7 +101,7 @@ def misfit(normal: Normal) -> float:
     return float(np.median(normal.squares[there] / usual))
 
 
-def predict_state(
+def _predict_state(
     problem: FitProblem,
     before: SearchState,
     known: WhitenedRows | None,
@@ -151,7 +151,7 @@ def evaluate_step(
         if step is not None and problem.straight:
             after.poses[part], after.lengths[part] = fit_poses(machine, problem.readings(reported, part), starts)
         elif step is not None:
-            after.lengths[part], starts = predict_state(problem, before, known, step, machine, reported, part, share)
+            after.lengths[part], starts = _predict_state(problem, before, known, step, machine, reported, part, share)
         lengths = after.lengths[part]
         there = kept[part] & np.isfinite(lengths).all(axis=1) & (lengths > 0.0).all(axis=1)
         if not problem.straight:

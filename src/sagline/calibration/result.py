@@ -83,7 +83,7 @@ _WITHOUT_MOTION = (
 )
 
 
-def motion_slopes(machine: MachineTerms, poses: Array, lengths: Array) -> tuple[Array, Array]:
+def _motion_slopes(machine: MachineTerms, poses: Array, lengths: Array) -> tuple[Array, Array]:
     """Derivatives of the pose (origin, rotation vector) [m, rad]: (N, 6, P) by values and (N, 6, m) by lengths."""
     if machine.model.code == codes.STRAIGHT:
         by_values, by_length = slopes_of_poses(machine, machine.winch_slopes(lengths), poses)
@@ -232,7 +232,7 @@ class Calibration(Findings, Saved):
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
         reported = self.length_offset, self.length_scale
         machine = MachineTerms.of(self.robot, self.model, self.parameters, Sensors(), *reported)
-        return motion_slopes(machine, poses, lengths)
+        return _motion_slopes(machine, poses, lengths)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:
         """Covariance (N, 6, 6) of origin and rotation vector, due to errors of the values and of the winch lengths."""

@@ -38,7 +38,7 @@ def screen(
     # The last two reasons do not apply to the rows with `usable` True, (N,).
     # Raises an error if the log has a wrong number of cables, or the robot cannot convert its counts to lengths.
     limit = float(exactly(speed_limit, "speed_limit", "m/s", (), above=0.0, infinite=True))
-    lengths = lengths_of(robot, log)
+    lengths = _lengths_of(robot, log)
     found: dict[Omission, Indices] = {}
     kept = np.ones(len(log), dtype=np.bool_)
     for reason, wrong in (
@@ -55,7 +55,7 @@ def screen(
     return log if kept.all() else log.rows(kept), locked(np.flatnonzero(kept)), found
 
 
-def lengths_of(robot: Robot, log: WinchLog) -> Array:
+def _lengths_of(robot: Robot, log: WinchLog) -> Array:
     """Lengths off the drums (N, m) [m] that the readings of a log give; NaN for a missing reading."""
     m = instance(robot, Robot, "robot").cable_count
     cables = instance(log, WinchLog, "log").readings.shape[1]
@@ -108,7 +108,7 @@ def _repeated(log: WinchLog) -> Flags:
 def moving_rows(robot: Robot, log: WinchLog) -> tuple[Flags, Array]:
     """Moving rows (N,) with a measured pose; speed [m/s] and acceleration [m/s^2] of reported lengths, (2, N, m)."""
     # They are differences to the nearest rows in time, 0.1 s to 1 s away on both sides; zero for all other rows.
-    lengths, read = lengths_of(robot, log), [v for v in (log.position, log.rotation) if v is not None]
+    lengths, read = _lengths_of(robot, log), [v for v in (log.position, log.rotation) if v is not None]
     measured = np.zeros(len(log), dtype=np.bool_) if log.time is None else _moving(log, lengths, SPEED_LIMIT)
     motion = np.zeros((2, *lengths.shape))
     if log.time is None or not read:

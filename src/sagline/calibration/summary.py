@@ -70,7 +70,7 @@ def outlier_text(outlier: Outlier) -> str:
     return f"row {outlier.row}{where}: {outlier.quantity} {size} off ({times} deviations)"
 
 
-def row_ranges(rows: Sequence[int] | Indices) -> str:
+def _row_ranges(rows: Sequence[int] | Indices) -> str:
     """Text of increasing row indices with ranges, such as "rows 3, 17 to 19 and 5 more"."""
     spans: list[list[int]] = []
     for row in map(int, rows):
@@ -133,7 +133,7 @@ def _rows(found: Findings, width: int) -> Iterator[str]:
         return
     yield f"Rows: {len(found.rows):,} of {len(found.rows) + count:,} were used, {count:,} left out:"
     for reason, rows in left.items():
-        yield from _wrapped(f"{reason.text}: {row_ranges(rows)}", width, "  ")
+        yield from _wrapped(f"{reason.text}: {_row_ranges(rows)}", width, "  ")
 
 
 def _sensors(found: Findings, width: int) -> Iterator[str]:
@@ -305,7 +305,7 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
     less = (found.weights < 1.0).any()  # with robust=False, all poses have full weight
     yield f"Outliers, {len(found.outliers)}{'; their poses have less weight' if less else ''}:"
     single = list(found.outliers)
-    for (quantity, cable), own in faulty_sensors(found).items():
+    for (quantity, cable), own in _faulty_sensors(found).items():
         single = [one for one in single if one not in own]
         size = n(float(np.median([one.size for one in own])), ".3g", UNITS[quantity])
         text = f"{quantity} {cable}, {len(own)} of {len(found.rows):,} rows: {size} off (median); check this sensor"
@@ -320,7 +320,7 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
         yield f"  and {len(single) - MOST_OUTLIERS:,} more"
 
 
-def faulty_sensors(found: Findings) -> dict[tuple[str, int], list[Outlier]]:
+def _faulty_sensors(found: Findings) -> dict[tuple[str, int], list[Outlier]]:
     """Outliers of faulty sensors, which are length sensors or load cells with more outliers than chance explains."""
     groups: dict[tuple[str, int], list[Outlier]] = {}
     for one in found.outliers:

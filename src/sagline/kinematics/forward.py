@@ -72,7 +72,7 @@ def _search_block(robot: batch.Robots, model: CableModel, lengths: Array, wrench
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[left])
         robots = batch.robots_at(robot, left)
         answer = from_orientations(robots, model, locked(lengths[left]), loads, quaternion)
-        outside = outside_limits(robots, model, answer)
+        outside = _outside_limits(robots, model, answer)
         energy = np.nan_to_num(answer.numbers[:, tables.ENERGY], nan=0.0)
         rank = np.stack((_POOR[answer.pose_status].astype(np.float64), outside, energy), axis=1)
         first = np.argmax(rank != ranks[left], axis=1)[:, None]  # column of the first difference of two rankings
@@ -92,7 +92,7 @@ def from_orientations(
     """Equilibria from the middle of the frame: first with fixed `quaternion` (4,) or (N, 4), then with all motions."""
     shared = batch.first_of(robot)
     freedom = shared.freedom
-    starts = pose_rows(Pose.from_quaternion(starting_positions(robot, lengths, quaternion), quaternion))
+    starts = pose_rows(Pose.from_quaternion(_starting_positions(robot, lengths, quaternion), quaternion))
     if shared.motion_pattern not in ROTATING:
         return solve_forward_rows(robot, model, lengths, starts, wrenches)
     translations = locked(freedom[~freedom[:, 3:].any(axis=1)])
@@ -100,7 +100,7 @@ def from_orientations(
     return solve_forward_rows(robot, model, lengths, locked(placed.poses), wrenches)
 
 
-def starting_positions(robot: batch.Robots, lengths: Array, quaternion: Array) -> Array:
+def _starting_positions(robot: batch.Robots, lengths: Array, quaternion: Array) -> Array:
     """Start positions (N, 3) [m] slightly below the center of the frame ends, within the platform's free motions."""
     # The center itself is excluded, because there the two ends of a single cable would coincide.
     freedom = batch.first_of(robot).freedom
@@ -129,7 +129,7 @@ def start_quaternions(robot: Robot) -> Array:
     return np.array(rows)
 
 
-def outside_limits(robot: batch.Robots, model: CableModel, found: ForwardRows) -> Indices:
+def _outside_limits(robot: batch.Robots, model: CableModel, found: ForwardRows) -> Indices:
     """Number of cables outside their tension limits, (N,), or 0 for straight cables, whose tensions are unknown."""
     least, most = batch.robot_fields(robot, "tension_min", "tension_max")
     cables, contact = cables_of_results(robot, model, found.results, found.cable_status, found.pose_status.shape)

@@ -138,7 +138,7 @@ def _weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
     return np.asarray(np.einsum("ng,g->n", costs, weights / weights.sum()))
 
 
-def pareto_front(costs: Array) -> Indices:
+def _pareto_front(costs: Array) -> Indices:
     """Indices of the Pareto-optimal candidates with `costs` (N, g); only the first of several equal candidates."""
     _, first = np.unique(costs, axis=0, return_index=True)
     kept = np.sort(first)
@@ -200,7 +200,7 @@ class _Ledger:
         request, costs = self._request, self._costs(self._rows)
         goals = self._rows[:, self._width :]
         if request.optimizer == "nsga2":
-            which = pareto_front(costs)
+            which = _pareto_front(costs)
             which = which[which != 0]
             which = which[np.isfinite(goals[which]).all(axis=1)]
             which = which[np.argsort(costs[which, 0], kind="stable")]

@@ -208,11 +208,13 @@ def brackets(
 
 
 def crossings(level: Level, inner: Array, outer: Array, at_inner: Array, at_outer: Array, **limits: float) -> Array:
-    """Same as `crossings_of`, but with one function `level` for all V lines."""
-    return crossings_of(lambda _, positions: level_values(level, positions), inner, outer, at_inner, at_outer, **limits)
+    """Same as `_crossings_of`, but with one function `level` for all V lines."""
+    return _crossings_of(
+        lambda _, positions: level_values(level, positions), inner, outer, at_inner, at_outer, **limits
+    )
 
 
-def crossings_of(
+def _crossings_of(
     values: Callable[[Indices, Array], Array],
     inner: Array,
     outer: Array,

@@ -167,7 +167,7 @@ def test_cable_that_leaves_a_drum_keeps_its_strain() -> None:
     cables = np.zeros((2, tables.CABLE_COLUMNS))
     cables[:, tables.DENSITY], cables[:, tables.STIFFNESS] = 0.1, 5e4
     drives = d.Drives(d.DRUMS, False, data, now, np.zeros((2, 1)), np.zeros(d.AUDIT_SIZE))
-    inspect.unwrap(d.turn_drums)(drives, cables, rows, 9.81, time)
+    inspect.unwrap(d._turn_drums)(drives, cables, rows, 9.81, time)
     let_out = time * speed / (1.0 + strain)
     np.testing.assert_allclose(rows[LENGTH], let_out, rtol=1e-14)
     energy = (0.5 * 5e4 * strain**2 - 0.1 * 9.81 * rise) * let_out

@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.dynamics.vibration.component_modes import CableComponents
-from sagline.dynamics.vibration.dynamic_stiffness import in_world
+from sagline.dynamics.vibration.dynamic_stiffness import _in_world
 from sagline.dynamics.vibration.robot_modes import VibrationModel
 from tests.dynamics.states import middle
 from tests.kernels.dynamics.strings import added, chain, string
@@ -31,7 +31,7 @@ def test_at_rest_it_is_the_static_stiffness(name: str) -> None:
     xx, xz, zz, yy = last[:, 2:].T
     determinant = xx * zz - xz**2
     inverse = np.stack((zz / determinant, -xz / determinant, xx / determinant, 1.0 / yy), axis=-1)
-    summed = in_world(inverse[None], components.axes)[0]
+    summed = _in_world(inverse[None], components.axes)[0]
     assert (np.abs(summed - static) <= 1e-11 * size).all()
 
 

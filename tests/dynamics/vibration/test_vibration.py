@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import simpson
 
 import sagline as sl
-from sagline.dynamics.vibration.dynamic_stiffness import EXACT, in_world
+from sagline.dynamics.vibration.dynamic_stiffness import EXACT, _in_world
 from sagline.dynamics.vibration.robot_modes import VibrationModel, _dynamic_matrix
 from sagline.kernels.dynamics import collocation
 from tests.dynamics.linear_systems import mass_of
@@ -106,7 +106,7 @@ def _root(state: sl.Equilibrium, damping: sl.Damping, omega: complex) -> complex
         counts = np.empty((1, 1, 8, 2), dtype=np.int64)
         room = np.empty(collocation.ROOM, dtype=np.complex128)
         collocation.dynamic_stiffnesses(setting.strings.table, waves, EXACT, room, found, counts)
-        moving = in_world(found[0], setting.strings.axes[0])[0]
+        moving = _in_world(found[0], setting.strings.axes[0])[0]
         whole = np.einsum("mai,mab,mbj->ij", setting.ends[0], moving, setting.ends[0])
         whole += setting.stiffness[0] - at**2 * setting.mass[0]
         return complex(np.linalg.det(whole) / static)

@@ -10,7 +10,7 @@ from scipy.linalg import eigh, solve
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.vibration.dynamic_stiffness import EXACT, waves_of
+from sagline.dynamics.vibration.dynamic_stiffness import EXACT, _waves_of
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.string import STRING_COLUMNS
 from sagline.statics.strings import COUNTING, undamped
@@ -27,7 +27,7 @@ def string(horizontal: float, vertical: float, length: float, density: float, st
 
 def added(table: Array, frequency: Any, damping: sl.Damping | None = None) -> NDArray[Any]:
     """K(omega) - K(0) of cables at frequencies (F,): xx, xz, zz, yy, shape (F, m, FOUND)."""
-    waves = waves_of(np.atleast_1d(np.asarray(frequency, dtype=np.float64)), damping)
+    waves = _waves_of(np.atleast_1d(np.asarray(frequency, dtype=np.float64)), damping)
     return _both(table, waves if damping else np.ascontiguousarray(waves.real), EXACT)[0]
 
 

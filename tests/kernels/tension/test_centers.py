@@ -14,7 +14,7 @@ from tests.kernels.tension.problems import Problem, random_problem, room_of
 from tests.tiers import wide
 
 share_at_center = from_python(c.share_at_center)
-is_inside = from_python(c.keeps_limits_inside)
+is_inside = from_python(c._keeps_limits_inside)
 deepest_point = from_python(c.deepest_point)
 
 

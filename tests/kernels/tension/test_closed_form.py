@@ -6,12 +6,12 @@ import pytest
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.codes import CLOSED_FORM, IMPROVED_CLOSED_FORM, PUNCTURE
-from sagline.kernels.tension.other_methods import share_near_middle
+from sagline.kernels.tension.other_methods import _share_near_middle
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import Problem, random_problem
 from tests.tiers import extended
 
-share = from_python(share_near_middle)
+share = from_python(_share_near_middle)
 
 
 def closed_form(problem: Problem) -> Array:

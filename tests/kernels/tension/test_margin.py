@@ -13,10 +13,10 @@ from tests.kernels.compiled import from_python, memory
 from tests.tiers import wide
 
 capacity_margin = from_python(margin.zonotope_margin)
-next_choice = from_python(margin.next_choice)
-extend = from_python(margin.extend_frame)
-complete = from_python(margin.complete_frame)
-support = from_python(margin.zonotope_reach)
+next_choice = from_python(margin._next_choice)
+extend = from_python(margin._extend_frame)
+complete = from_python(margin._complete_frame)
+support = from_python(margin._zonotope_reach)
 
 
 @pytest.mark.parametrize(("count", "m"), [(1, 4), (2, 5), (5, 8), (3, 3), (0, 2)])

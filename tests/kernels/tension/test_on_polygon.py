@@ -16,7 +16,7 @@ from tests.tiers import wide
 distribute_on_polygon = from_python(o.distribute_on_polygon)
 feasible_interval = from_python(o.feasible_interval)
 centroid = from_python(o.centroid)
-lowest_corner = from_python(o.lowest_corner)
+lowest_corner = from_python(o._lowest_corner)
 
 WALKS = [codes.WALK_SUM, codes.WALK_NORM, codes.WALK_CENTROID]
 

@@ -18,8 +18,8 @@ feasible_polygon = from_python(p.feasible_polygon)
 polygon_again = from_python(p.polygon_again)
 nearest_corner_point = from_python(p.nearest_corner_point)
 nearest_on_side = from_python(p.nearest_on_side)
-widest_pair = from_python(p.widest_pair)
-walk_polygon = from_python(on_polygon.walk_polygon)
+widest_pair = from_python(p._widest_pair)
+walk_polygon = from_python(on_polygon._walk_polygon)
 
 
 def polygon_of(problem: Problem) -> tuple[Array, Indices]:

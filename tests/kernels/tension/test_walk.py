@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from sagline.kernels.tension.on_polygon import most_independent, walk_polygon
+from sagline.kernels.tension.on_polygon import _most_independent, _walk_polygon
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import area_of, brute_corners, corner_room, random_problem
 from tests.tiers import wide
 
-walk = from_python(walk_polygon)
-independent = from_python(most_independent)
+walk = from_python(_walk_polygon)
+independent = from_python(_most_independent)
 
 
 @pytest.mark.parametrize("m", wide([4, 3, 8, 16]))

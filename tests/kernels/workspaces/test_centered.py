@@ -12,7 +12,7 @@ from sagline.kernels.workspaces import box_tensions
 from sagline.kernels.workspaces.box_tensions import Centered
 from tests.kernels.compiled import from_python
 
-find_center = from_python(box_tensions.find_center)
+find_center = from_python(box_tensions._find_center)
 SMOOTHING = 0.01
 
 

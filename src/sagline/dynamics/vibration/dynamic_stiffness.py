@@ -137,14 +137,14 @@ def taut_stiffness(
 ) -> tuple[Indices, Complex, Indices]:
     """Indices of taut cables, their dynamic minus static stiffness, and numbers of their modes below `frequency`."""
     # shapes: frequency (F,) [Hz]; phase of a wave in an element [rad]; returns (t,), (F, t, 3, 3) [N/m], (1, F, t, 2)
-    waves = undamped(frequency[None]) if damping is None else waves_of(frequency, damping)
+    waves = undamped(frequency[None]) if damping is None else _waves_of(frequency, damping)
     taut = np.flatnonzero(strings.taut[row])
     table = np.ascontiguousarray(strings.table[row : row + 1, taut])
     found = np.empty((1, frequency.size, taut.size, collocation.FOUND), dtype=waves.dtype)
     counts = np.empty((*found.shape[:-1], 2), dtype=np.int64)
     dynamic_stiffnesses(table, waves, phase, np.empty(collocation.ROOM, dtype=waves.dtype), found, counts)
     _check_counts(counts, frequency)
-    return taut, in_world(found[0], strings.axes[row, taut]), counts
+    return taut, _in_world(found[0], strings.axes[row, taut]), counts
 
 
 def _check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
@@ -159,7 +159,7 @@ def _check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
         raise SaglineError(f"{text}. Use another frequency, and report the robot and its pose.")
 
 
-def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
+def _in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
     """Cable stiffness in the plane and normal to the plane, converted to world axes."""
     # shapes: found (F, m, FOUND); axes (m, 3, 3); returns (F, m, 3, 3)
     xx, xz, zz, yy = np.moveaxis(found, -1, 0)[..., None, None]
@@ -174,7 +174,7 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
     )
 
 
-def waves_of(frequency: Array, damping: Damping | None) -> Complex:
+def _waves_of(frequency: Array, damping: Damping | None) -> Complex:
     """Array for the kernels that contains `frequency` and `damping`."""
     # shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS)
     waves: Complex = undamped(frequency[None]).astype(np.complex128)

@@ -18,7 +18,7 @@ BIN = 0.005  # length of a bin [m]: a piece of the cable on the drum that has a 
 
 
 @kernel
-def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
+def _wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
     """Wind cable onto a drum. Returns the energy [J] lost by averaging the strain in each bin of cable."""
     # The strained and the unstrained length of the cable in a bin do not change when its strain is averaged.
     # `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out
@@ -40,7 +40,7 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
 
 
 @kernel
-def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
+def _pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
     """Mean strain of the cable that a drum pays out, and the energy [J] that is lost by averaging."""
     # `layer`: strain in each bin of the cable on the drum, (B,); the last bin has no end. `place`: length paid out
     # before this step [m]. `step`: length to pay out [m], > 0. `stiffness`: EA [N].
@@ -159,16 +159,16 @@ def _fill_stored_strain(drives: Drives, cables: Array, time: float) -> None:
             stiffness, step = cables[i, tables.STIFFNESS], time * drives.now[SPEED, i]
             if step < 0.0:
                 strain = drives.now[AT_DRUM, i] / stiffness
-                lost = wind_in(drives.layers[i], drives.now[WOUND, i], -step, strain, stiffness)
+                lost = _wind_in(drives.layers[i], drives.now[WOUND, i], -step, strain, stiffness)
             elif step > 0.0:
-                strain, lost = pay_out(drives.layers[i], drives.now[WOUND, i], step, stiffness)
+                strain, lost = _pay_out(drives.layers[i], drives.now[WOUND, i], step, stiffness)
         drives.now[STORED, i] = strain
         drives.audit[ON_DRUMS] -= lost
         drives.audit[LOST] += lost
 
 
 @formula
-def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
+def _turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
     """Pay out or wind in cable for `time`, and update the energy of the cable on the drums."""
     _fill_stored_strain(drives, cables, time)
     for i in range(cables.shape[0]):
@@ -255,7 +255,7 @@ def store_step_start(drives: Drives, rows: Array) -> None:
 def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
     """Pay out or wind in cable for `time`. Ideal winches are skipped, because they follow their set points."""
     if drives.kind == DRUMS:
-        turn_drums(drives, cables, rows, gravity, time)
+        _turn_drums(drives, cables, rows, gravity, time)
     elif drives.kind == SECOND_ORDER:
         for i in range(rows.shape[1]):
             rows[g.LENGTH, i] += time * drives.now[RATE, i]

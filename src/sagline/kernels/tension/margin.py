@@ -26,7 +26,7 @@ DEPENDENT = 1e-20
 
 
 @glue
-def next_choice(chosen: Indices, m: int) -> int:
+def _next_choice(chosen: Indices, m: int) -> int:
     """Replace the combination `chosen` by the next one. Returns the first changed position, or -1 after the last."""
     count = chosen.size
     place = -1
@@ -41,7 +41,7 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 
 @glue
-def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
+def _extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
     """Add the columns `chosen[first:]` to the frame (n, n). Returns the number of rows of the frame."""
     # A column that depends linearly on the columns before it adds no row.
     n = matrix.shape[0]
@@ -60,7 +60,7 @@ def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, trian
 
 
 @glue
-def complete_frame(frame: Array, triangle: Array) -> None:
+def _complete_frame(frame: Array, triangle: Array) -> None:
     """Fill the last row of a frame (n, n), which is perpendicular to all other rows."""
     n = frame.shape[0]
     best = 0
@@ -75,7 +75,7 @@ def complete_frame(frame: Array, triangle: Array) -> None:
 
 
 @formula
-def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
+def _zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
     """Largest values of normal . J t and of -normal . J t over all tensions t within their limits; may be infinite."""
     forward = backward = 0.0
     for i in range(matrix.shape[1]):
@@ -106,14 +106,14 @@ def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
     least = math.inf
     held = 0  # number of chosen columns in the frame
     for _ in range(MOST_FACES):
-        held = extend_frame(matrix, chosen, held, frame, triangle)
+        held = _extend_frame(matrix, chosen, held, frame, triangle)
         if held == n - 1:
-            complete_frame(frame, triangle)
+            _complete_frame(frame, triangle)
             along, force = dot(normal, needed), norm(normal[:translations])
             if force > 1e-9:
-                forward, backward = zonotope_reach(matrix, low, high, normal)
+                forward, backward = _zonotope_reach(matrix, low, high, normal)
                 least = min(least, (forward - along) / force, (backward + along) / force)
-        changed = next_choice(chosen, m)
+        changed = _next_choice(chosen, m)
         if changed < 0:
             break
         held = min(held, changed)

@@ -38,7 +38,7 @@ def _limit_lines(bounds: Array, null: Array, lines: Array) -> None:
 
 
 @kernel
-def most_independent(null: Array) -> tuple[int, int]:
+def _most_independent(null: Array) -> tuple[int, int]:
     """The two cables whose null-space rows span the largest parallelogram."""
     m = null.shape[1]
     best = 0.0
@@ -53,7 +53,7 @@ def most_independent(null: Array) -> tuple[int, int]:
 
 
 @kernel
-def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, labels: Indices) -> int:
+def _walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, labels: Indices) -> int:
     """Fill corners, counter-clockwise, and labels as in `feasible_polygon`. Returns the number of corners."""
     # The number is 0 if the polygon is empty, and -1 if the walk failed. All limits must be finite.
     m = null.shape[1]
@@ -61,7 +61,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     lines, memory = block(memory, 2 * m, 3)
     _limit_lines(bounds, null, lines)
     met, memory = counters(memory, 2 * m)  # entry 1: the walk includes this limit
-    a, b = most_independent(null)
+    a, b = _most_independent(null)
     line = 2 * a
     # start: the corner at which line a begins; the line runs counter-clockwise, with the inside on its left
     other = 2 * b
@@ -131,7 +131,7 @@ def distribute_on_polygon(
     count = known[0]
     if count == 0 or not polygon.polygon_again(bounds, null, corners, labels, count):
         if method == codes.POLYGON_WALK and r == 2:
-            count = walk_polygon(bounds, null, work.rest, corners, labels)
+            count = _walk_polygon(bounds, null, work.rest, corners, labels)
         else:
             count = feasible_corners(bounds, null, corners, labels)
     known[0] = count if r == 2 else 0
@@ -141,7 +141,7 @@ def distribute_on_polygon(
     x = reference[0]
     y = reference[1] if r == 2 else 0.0
     if method == codes.POLYGON_WALK and parameter == codes.WALK_SUM:
-        x, y = lowest_corner(bounds, null, corners, count, x, y)
+        x, y = _lowest_corner(bounds, null, corners, count, x, y)
     elif method == codes.POLYGON_WALK and parameter == codes.WALK_NORM:
         if most_violated_bound(null, bounds, reference, 0.0, True) >= 0:
             x, y = polygon.nearest_corner_point(corners, count, x, y)
@@ -228,7 +228,7 @@ def centroid(corners: Array, count: int) -> tuple[float, float]:
 
 
 @kernel
-def lowest_corner(
+def _lowest_corner(
     bounds: Array, null: Array, corners: Array, count: int, goal_x: float, goal_y: float
 ) -> tuple[float, float]:
     """Point with the least sum of tensions. If a whole side has the least sum, the point of it nearest to the goal."""

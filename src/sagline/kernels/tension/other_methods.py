@@ -35,7 +35,7 @@ CENTERED = 1e-18  # square of the Newton decrement at which the search ends
 def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
     """Move `point` (r,) to the analytic center. If a previous center exists, the search starts from it."""
     corners, labels, known = work.corners, work.labels, work.known
-    if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
+    if known[0] > 0 and _keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
         return codes.POSE_SOLVED
     known[0] = 0
     r, m = null.shape
@@ -61,7 +61,7 @@ def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) 
 
 
 @kernel
-def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
+def _keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
     """True if the distance of `point` from every limit exceeds the smallest thickness."""
     slack = THIN * largest_bound(bounds)
     for i in range(null.shape[1]):
@@ -149,7 +149,7 @@ DEPENDENT = 1e-10
 
 
 @kernel
-def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, tension: Array) -> bool:
+def _share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, tension: Array) -> bool:
     """Fill the tensions (m,) by the closed form, the improved closed form or the puncture method."""
     # Returns True if the method found tensions within their limits.
     # Source: Pott, Bruckmann & Mikelsons 2009; Pott 2014; Mueller, Reichert & Bruckmann 2015.
@@ -246,7 +246,7 @@ def distribute_by_other_method(
         kept = nearest.satisfies_limits(bounds, tension, TOLERANCE * largest_bound(bounds))
         status = codes.POSE_SOLVED if kept else codes.POSE_INFEASIBLE
     elif codes.CLOSED_FORM <= method <= codes.PUNCTURE:
-        if not share_near_middle(method, bounds, null, work.rest, tension):
+        if not _share_near_middle(method, bounds, null, work.rest, tension):
             status = nearest.share_nearest(bounds, null, near, tension)
             status = codes.POSE_NOT_COVERED if status == codes.POSE_SOLVED else status
     else:

@@ -81,7 +81,7 @@ def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, en
 
 
 @glue
-def widest_pair(null: Array) -> tuple[int, int, float]:
+def _widest_pair(null: Array) -> tuple[int, int, float]:
     """Two cables whose rows span a large parallelogram, and the signed area of the parallelogram."""
     # The first cable has the longest row. The second cable gives the largest area together with the first cable.
     m = null.shape[1]
@@ -104,7 +104,7 @@ def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, la
     """Fill the four corners of the intersection of two bounds. A box replaces an infinite limit."""
     # Returns the two bounds.
     m = null.shape[1]
-    a, b, area = widest_pair(null)
+    a, b, area = _widest_pair(null)
     for k in range(4):
         # the order is counter-clockwise if the area is positive; each corner is at one limit of a and one limit of b
         u = 2 * a + (0 if k == 0 or k == 3 else 1)

@@ -246,7 +246,7 @@ def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> boo
 
 
 @kernel
-def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
+def _find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     """Move the tensions to the smoothed center. Returns the square of the remaining residual [N^2]."""
     # `matrix`: structure matrix, all rows in newtons, (n, m). `smoothing`: [N^2], > 0. `centered`: contains limits and
     # right side; the other fields are filled.
@@ -478,6 +478,6 @@ def center_tensions(
     for _ in range(iterations):
         _fill_demand(curves, place, body, wrench, centered, ranges)
         smoothing = _smoothing_of(place, geometry, centered.tau)
-        find_center(place.matrix, smoothing, centered)
+        _find_center(place.matrix, smoothing, centered)
     _fill_demand(curves, place, body, wrench, centered, ranges)
     return _fill_imbalance(place.matrix, centered) > BEYOND * centered.tau.size * smoothing
