@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import Calibration, plot
 from sagline.core.arrays import Array
-from sagline.plot.calibration import MOST_POSES, REACH
+from sagline.plot.calibration import MOST_POSES, REACH, _mark_outliers
 from tests.calibration.made_up import NAMES, made_up
 from tests.plot.readable import drawn_texts, overlaps
 from tests.refusal import refused
@@ -56,6 +57,16 @@ def test_outliers_have_a_ring_and_a_number(found: sl.Calibration) -> None:
     np.testing.assert_array_equal(edges["^"], [[4.0, REACH]])
     np.testing.assert_array_equal(edges["v"], [[17.0, -REACH]])
     assert not cells.texts
+
+
+@pytest.mark.parametrize(
+    ("quantity", "text"), [("rotation", "0.2 rad"), ("frequency", "0.2 Hz"), ("load cell", "0.2 N")]
+)
+def test_the_number_of_an_outlier_has_the_unit_of_its_reading(found: sl.Calibration, quantity: str, text: str) -> None:
+    ax = Figure().add_subplot()
+    outliers = (replace(found.outliers[0], cable=None, quantity=quantity, size=0.2),)
+    _mark_outliers(ax, replace(found, outliers=outliers), quantity)
+    assert [each.get_text().replace("\u00a0", " ") for each in ax.texts] == [text]
 
 
 def test_missing_sensors_have_no_panel(found: sl.Calibration) -> None:

@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from sagline.calibration.findings import columns_of
+from sagline.calibration.findings import UNITS, columns_of
 from sagline.calibration.log import count_of_frequencies, reading_deviations
 from sagline.calibration.result import Calibration
 from sagline.calibration.summary import chi_squared_text
@@ -146,10 +146,9 @@ def _mark_outliers(ax: Axes, found: Calibration, quantity: str) -> None:
         ax.plot(outlier.row, place, "o", markersize=8.0, markerfacecolor="none", markeredgecolor=VERMILLION, zorder=3.0)
         if named < MOST_NAMED:
             cable = "" if outlier.cable is None else f"cable {outlier.cable}, "
-            unit = {"length": "m", "load cell": "N", "position": "m"}.get(outlier.quantity, "rad")
             left = outlier.row > found.rows[0] + 0.7 * (found.rows[-1] - found.rows[0])
             side, away = ("right", -7.0) if left else ("left", 7.0)
-            size = f"{cable}{n(outlier.size, '.2g', unit)}"
+            size = f"{cable}{n(outlier.size, '.2g', UNITS[quantity])}"
             write_beside(ax, size, (outlier.row, place), (away, 0.0), ha=side, zorder=4.0, annotation_clip=None)
             named += 1
 
