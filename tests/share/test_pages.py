@@ -15,7 +15,7 @@ from sagline.robot.reach import home_pose
 from sagline.share.course import SharedMotion
 from sagline.share.page import LENGTH, POSITION, TENSION, TIME, TURN, course_page, robot_page
 from sagline.viewer import shapes
-from sagline.viewer.shapes import platform_solid
+from sagline.viewer.shapes import Solid
 from tests.chromium import NEEDED, launched
 from tests.share.opening import FLAGS, asking, opened
 from tests.tiers import extended
@@ -179,7 +179,7 @@ def test_straight_cables_are_drawn_while_kernels_load(browser: Browser, tmp_path
 @pytest.mark.parametrize("height", [640, 844])
 def test_a_platform_outside_of_its_frame_is_completely_visible(browser: Browser, tmp_path: Path, height: int) -> None:
     robot = sl.load_robot("falcon-7")
-    corners = home_pose(robot).transform(platform_solid(robot).vertices)
+    corners = home_pose(robot).transform(Solid.platform(robot).vertices)
     assert corners[:, 2].max() > 1.2 * robot.frame_anchors[:, 2].max()
     (tmp_path / "robot.html").write_text(robot_page(robot), encoding="utf-8")
     with opened(browser, tmp_path / "robot.html", width=390, height=height) as page:

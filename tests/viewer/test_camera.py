@@ -56,7 +56,7 @@ def test_invalid_cameras_are_refused(wrong: dict[str, object]) -> None:
 
 @pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
 def test_the_intersection_of_ray_and_platform_agrees_with_single_triangles(name: str) -> None:
-    body = shapes.platform_solid(sl.load_robot(name))
+    body = shapes.Solid.platform(sl.load_robot(name))
     size = float(np.abs(body.vertices).max())
     random = np.random.default_rng(4)
     hits = 0

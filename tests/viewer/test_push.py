@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 import sagline as sl
 from sagline import structure_matrix
 from sagline.viewer.features import push
-from sagline.viewer.features.push import Push, PushResponse, semi_axes
+from sagline.viewer.features.push import Push, PushResponse
 from sagline.viewer.page import home_pose
 from tests.refusal import refused
 from tests.tiers import wide
@@ -78,7 +78,7 @@ def test_the_compliance_agrees_with_differences_of_forward(name: str) -> None:
         columns.append((places[0] - places[1]) / (2.0 * small))
     by_differences = np.column_stack(columns)
     np.testing.assert_allclose(found.compliance, by_differences, atol=1e-4 * np.abs(by_differences).max())
-    lengths, directions = semi_axes(found.compliance)
+    lengths, directions = found.semi_axes
     assert np.all(np.diff(lengths) >= 0.0)
     # the ellipsoid is where forces of 1 N in all directions take the place
     some = np.random.default_rng(3).normal(size=(50, 3))

@@ -21,7 +21,7 @@ from tests.viewer.shown import ROBOT, Shown, framed, handle, shown
 
 POSE = sl.Pose([0.5, 0.5, 1.5], np.eye(3))
 WIDE, HIGH, FOV = 800, 600, 1.0
-BODY = shapes.platform_solid(ROBOT)
+BODY = shapes.Solid.platform(ROBOT)
 STIFFNESS = np.sqrt(25.0 * 2000.0) / (FAR * shapes.size_of(ROBOT))  # N/m, of the limits of the tensions
 
 

@@ -85,6 +85,6 @@ def test_a_dead_length_of_unknown_direction_is_dashed(server: PageServer) -> Non
         points = np.asarray(node(server, name).points)
         assert np.linalg.norm(points[:, 1] - points[:, 0], axis=1).sum() == pytest.approx(runs, rel=1e-5)
     low, high = stage.extent(home_pose(robot))
-    drums = shapes.winch_solid(robot).vertices
+    drums = shapes.Solid.winches(robot).vertices
     assert np.all(drums > low)
     assert np.all(drums <= high)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.viewer.slices import APART, FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, MarginScale, picture_of
+from sagline.viewer.slices import APART, FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, MarginScale
 from sagline.viewer.tension_scale import ForceUnit
 from sagline.workspaces.levels import Plane, slice_of
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
@@ -15,7 +15,7 @@ SCALE, UNIT = MarginScale(25.0), ForceUnit("N", 1.0, ".1f")
 @pytest.mark.parametrize("normal", [0, 1, 2])
 def test_lines_are_at_round_margins(normal: int) -> None:
     cut = slice_of(ball, Plane(normal, 0.3), LOW, HIGH, (40, 40))
-    _, boundary, lines, _ = picture_of(cut, SCALE, UNIT)
+    _, boundary, lines, _ = SCALE.picture(cut, UNIT)
     assert np.all(boundary[..., normal] == 0.3)
     np.testing.assert_allclose(np.linalg.norm(boundary, axis=-1), RADIUS, atol=5e-3)
     steps = PER_METER * (RADIUS - np.linalg.norm(lines, axis=-1)) / SCALE.step
@@ -27,7 +27,7 @@ def test_lines_are_at_round_margins(normal: int) -> None:
 
 def test_lines_have_their_margins_without_overlap() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (60, 60))
-    marks = picture_of(cut, SCALE, UNIT)[3]
+    marks = SCALE.picture(cut, UNIT)[3]
     assert [text for text, _ in marks] == ["0 N", "−25 N", "25 N", "50 N", "75 N"]
     places = np.array([place for _, place in marks])
     margins = ball(places).margin
@@ -38,7 +38,7 @@ def test_lines_have_their_margins_without_overlap() -> None:
 
 def test_each_pixel_has_the_color_of_its_margin() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (30, 30))
-    image = picture_of(cut, SCALE, UNIT)[0]
+    image = SCALE.picture(cut, UNIT)[0]
     count = FINER * 29
     assert image.shape == (count, count, 4)
     x = LOW[0] + (np.arange(count) + 0.5) / count * (HIGH[0] - LOW[0])
@@ -53,13 +53,13 @@ def test_each_pixel_has_the_color_of_its_margin() -> None:
 def test_singular_poses_are_outside() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, np.array([1.9, 2.0, 2.0]), (60, 60))
     assert np.isinf(cut.margin).any()
-    boundary = picture_of(cut, SCALE, UNIT)[1]
+    boundary = SCALE.picture(cut, UNIT)[1]
     assert np.isfinite(boundary).all()
     assert boundary[..., 0].max() == pytest.approx(WALL, abs=0.07)  # within a cell
 
 
 def test_a_slice_outside_has_no_boundary() -> None:
-    image, boundary, *_ = picture_of(slice_of(ball, Plane(2, 1.8), LOW, HIGH, (10, 10)), SCALE, UNIT)
+    image, boundary, *_ = SCALE.picture(slice_of(ball, Plane(2, 1.8), LOW, HIGH, (10, 10)), UNIT)
     assert boundary.shape == (0, 2, 3)
     assert np.all(image[..., 3] == OUTSIDE_OPACITY)
 

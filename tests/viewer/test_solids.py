@@ -18,7 +18,7 @@ def mesh(solid: shapes.Solid) -> Any:
 
 
 def test_platform_is_a_closed_box_of_its_size() -> None:
-    platform = mesh(shapes.platform_solid(sl.load_robot("article-mixed")))
+    platform = mesh(shapes.Solid.platform(sl.load_robot("article-mixed")))
     assert platform.is_watertight
     assert platform.volume == pytest.approx(0.3 * 0.3 * 0.5)  # positive: the faces look outward
 
@@ -29,8 +29,8 @@ def test_every_preset_has_its_parts(name: str) -> None:
     low, high = shapes.bounds(robot)
     assert np.all(robot.frame_anchors >= low - 1e-9)
     assert np.all(robot.frame_anchors <= high + 1e-9)
-    assert mesh(shapes.platform_solid(robot)).volume > 0.0
-    frame = mesh(shapes.frame_solid(robot))
+    assert mesh(shapes.Solid.platform(robot)).volume > 0.0
+    frame = mesh(shapes.Solid.frame(robot))
     assert frame.volume > 0.0
     assert np.all(np.abs(frame.bounds - [low, high]) < 0.01 * shapes.size_of(robot))
 
@@ -50,10 +50,10 @@ def test_suspended_robot_without_a_frame_stands_on_the_floor() -> None:
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
 def test_assumed_frames_are_dashed(name: str) -> None:
     robot = sl.load_robot(name)
-    pieces = mesh(shapes.frame_solid(robot)).body_count
+    pieces = mesh(shapes.Solid.frame(robot)).body_count
     assert pieces == 1 if not shapes.is_frame_assumed(robot) else pieces > 60
     given = robot.replace(frame_size=shapes.bounds(robot)[1] - shapes.bounds(robot)[0], assumed={})
-    assert mesh(shapes.frame_solid(given)).body_count == 1
+    assert mesh(shapes.Solid.frame(given)).body_count == 1
 
 
 @pytest.mark.parametrize(
@@ -83,11 +83,11 @@ def test_pulleys_swivel_to_the_platform() -> None:
 
 def test_marks_replace_invisible_pulleys_and_drums_are_drawn() -> None:
     robot = sl.load_robot("ipanema-2")
-    assert mesh(shapes.winch_solid(robot)).body_count == 8
-    assert mesh(shapes.winch_solid(robot.replace(winches=sl.Winch(pulley_radius=0.01)))).body_count == 8
-    assert len(shapes.winch_solid(robot.replace(winches=sl.Winch(pulley_radius=0.2))).faces) == 0
+    assert mesh(shapes.Solid.winches(robot)).body_count == 8
+    assert mesh(shapes.Solid.winches(robot.replace(winches=sl.Winch(pulley_radius=0.01)))).body_count == 8
+    assert len(shapes.Solid.winches(robot.replace(winches=sl.Winch(pulley_radius=0.2))).faces) == 0
     wound = sl.Winch(pulley_radius=0.2, dead_cable=3.0, dead_rise=3.0, drum_radius=0.25, drum_width=0.4)
-    drums = mesh(shapes.winch_solid(robot.replace(winches=wound)))
+    drums = mesh(shapes.Solid.winches(robot.replace(winches=wound)))
     assert drums.body_count == 8
     assert drums.volume == pytest.approx(8 * np.pi * 0.25**2 * 0.4, rel=0.03)  # as good as twenty sides are
     assert drums.bounds[:, 2] == pytest.approx(robot.frame_anchors[[5, 3], 2] - 3.0 + [-0.25, 0.25], abs=0.005)

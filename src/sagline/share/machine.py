@@ -112,8 +112,8 @@ def _described(
 def solids_data(robot: Robot) -> dict[str, Any]:
     """Solids of frame, winches and platform, for page/scene.js."""
     low, high = bounds(robot)
-    body, size = shapes.platform_solid(robot), shapes.size_of(robot)
-    drawn = {"frame": shapes.frame_solid(robot), "winches": shapes.winch_solid(robot), "platform": body}
+    body, size = shapes.Solid.platform(robot), shapes.size_of(robot)
+    drawn = {"frame": shapes.Solid.frame(robot), "winches": shapes.Solid.winches(robot), "platform": body}
     meshes = {name: _triangles(each, size) for name, each in drawn.items() if len(each.faces)}
     least, most = body.vertices.min(axis=0), body.vertices.max(axis=0)
     middle, grip = 0.5 * (least + most), 0.5 * float(np.linalg.norm(most - least))
@@ -175,7 +175,7 @@ def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
     """SVG drawing of frame, platform and cables at `pose`. `tension`: chord tensions (m,) [N]."""
     courses = courses_at(robot, pose, tension)
     low, high = bounds(robot)
-    frame, body = shapes.box_corners(low, high), shapes.platform_solid(robot).vertices
+    frame, body = shapes.box_corners(low, high), shapes.Solid.platform(robot).vertices
     platform = pose.transform(shapes.box_corners(body.min(axis=0), body.max(axis=0)))
     groups = [_seen(each) for each in (frame, platform, *courses)]
     every = np.concatenate(groups)

@@ -128,9 +128,9 @@ class RobotScene:
         self._build_lights()
         self._low, self._high = shapes.bounds(robot)
         self._size = shapes.size_of(robot)
-        self._winches = shapes.winch_solid(robot)
+        self._winches = Solid.winches(robot)
         self._build_surroundings(robot)
-        body = self._body = shapes.platform_solid(robot)
+        body = self._body = Solid.platform(robot)
         # transform controls of the platform, which are only a frame in a scene for pictures
         frame: Any = None if live else scene.add_frame("/platform", show_axes=False)
         self.gizmo: viser.TransformControlsHandle = self._build_gizmo(robot, body) if live else frame
@@ -225,7 +225,7 @@ class RobotScene:
 
     def _build_surroundings(self, robot: Robot) -> None:
         nodes = self._nodes
-        nodes.mesh("/frame", *shapes.frame_solid(robot), STEEL)
+        nodes.mesh("/frame", *Solid.frame(robot), STEEL)
         if len(self._winches.faces):
             nodes.mesh("/winches", *self._winches, DRUM)
         self._build_dead_cables(robot)
@@ -245,7 +245,7 @@ class RobotScene:
 
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
         """Draw pulleys in their real size; they swivel with the platform."""
-        wheel, which = shapes.Solid.wheel(), self._over_pulleys
+        wheel, which = Solid.wheel(), self._over_pulleys
         return self._scene.add_batched_meshes_simple(
             "/pulleys", wheel.vertices, wheel.faces, shapes.pulley_rotations(robot, pose)[which],
             robot.frame_anchors[which],

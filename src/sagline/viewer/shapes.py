@@ -141,6 +141,42 @@ class Solid(NamedTuple):
     vertices: Array  # corners [m], shape (v, 3)
     faces: Indices  # triangles, as indices of corners, counter-clockwise from outside, shape (f, 3)
 
+    @staticmethod
+    def frame(robot: Robot) -> Solid:
+        """The twelve beams of the robot's box; they are dashed if the box is assumed."""
+        corners, thick = box_corners(*bounds(robot)), _BEAM * size_of(robot)
+        dash = _DASH * size_of(robot) if is_frame_assumed(robot) else np.inf
+        return _merged([beam for a, b in BOX_EDGES for beam in _beams(corners[a], corners[b], thick, dash)])
+
+    @classmethod
+    def winches(cls, robot: Robot) -> Solid:
+        """Known drums, and a mark at every frame anchor without a visible pulley."""
+        radius = _WINCH * size_of(robot)
+        marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
+        up = np.array([0.0, 0.0, radius])
+        parts = [cls.rod(np.stack((place - up, place + up)), radius) for place in np.unique(marked, axis=0)]
+        known = None if robot.winches is None else robot.winches.drum_radius
+        if known is not None:
+            parts += [cls.rod(ends, thick) for ends, thick in zip(drum_axes(robot), known, strict=True)]
+        return _merged(parts) if parts else cls(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+
+    @staticmethod
+    def platform(robot: Robot) -> Solid:
+        """The platform in its own frame: a box of its size, or the hull of its anchors."""
+        anchors = robot.platform_anchors
+        low, high = anchors.min(axis=0), anchors.max(axis=0)
+        if robot.platform_size is not None:
+            return _cuboid(0.5 * (low + high), robot.platform_size)
+        extent = high - low
+        thinnest = max(_THINNEST * float(extent.max()), 0.002 * size_of(robot))
+        flat = _cuboid(0.5 * (low + high), np.maximum(extent, thinnest))
+        if extent.min() < thinnest:
+            return flat
+        try:
+            return _hull(anchors)
+        except QhullError:  # the anchors are in an inclined plane
+            return flat
+
     @classmethod
     def wheel(cls) -> Solid:
         """A pulley of radius 1 for a cable along x that enters at the origin; its middle is at x = 1."""
@@ -217,13 +253,6 @@ def size_of(robot: Robot) -> float:
     return float(np.linalg.norm(high - low))
 
 
-def frame_solid(robot: Robot) -> Solid:
-    """The twelve beams of the robot's box; they are dashed if the box is assumed."""
-    corners, thick = box_corners(*bounds(robot)), _BEAM * size_of(robot)
-    dash = _DASH * size_of(robot) if is_frame_assumed(robot) else np.inf
-    return _merged([beam for a, b in BOX_EDGES for beam in _beams(corners[a], corners[b], thick, dash)])
-
-
 def box_corners(low: Array, high: Array) -> Array:
     """Corners of a box [m], shape (8, 3); z varies fastest."""
     return np.array(list(product(*zip(low, high, strict=True))))
@@ -259,40 +288,11 @@ def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
     return [_cuboid(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
 
 
-def winch_solid(robot: Robot) -> Solid:
-    """Known drums, and a mark at every frame anchor without a visible pulley."""
-    radius = _WINCH * size_of(robot)
-    marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
-    up = np.array([0.0, 0.0, radius])
-    parts = [Solid.rod(np.stack((place - up, place + up)), radius) for place in np.unique(marked, axis=0)]
-    known = None if robot.winches is None else robot.winches.drum_radius
-    if known is not None:
-        parts += [Solid.rod(ends, thick) for ends, thick in zip(drum_axes(robot), known, strict=True)]
-    return _merged(parts) if parts else Solid(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-
-
 def pulley_rotations(robot: Robot, pose: Pose) -> Array:
     """Rotations of the pulleys about the vertical, quaternions, scalar first, shape (m, 4)."""
     half = 0.5 * np.arctan2(*outward(robot, pose).T[::-1])
     zero = np.zeros_like(half)
     return np.stack((np.cos(half), zero, zero, np.sin(half)), axis=1)
-
-
-def platform_solid(robot: Robot) -> Solid:
-    """The platform in its own frame: a box of its size, or the hull of its anchors."""
-    anchors = robot.platform_anchors
-    low, high = anchors.min(axis=0), anchors.max(axis=0)
-    if robot.platform_size is not None:
-        return _cuboid(0.5 * (low + high), robot.platform_size)
-    extent = high - low
-    thinnest = max(_THINNEST * float(extent.max()), 0.002 * size_of(robot))
-    flat = _cuboid(0.5 * (low + high), np.maximum(extent, thinnest))
-    if extent.min() < thinnest:
-        return flat
-    try:
-        return _hull(anchors)
-    except QhullError:  # the anchors are in an inclined plane
-        return flat
 
 
 def _cuboid(middle: Array, edges: Array) -> Solid:

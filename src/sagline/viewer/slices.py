@@ -50,6 +50,21 @@ class MarginScale:
         """The color of each margin, shape (..., 3)."""
         return np.asarray(_COLORS[self.bands(margin)])
 
+    def picture(self, cut: Slice, unit: ForceUnit) -> tuple[NDArray[np.uint8], Array, Array, Marks]:
+        """Picture of a slice, lines where its margin is 0, lines at the borders of the other bands, and labels."""
+        # the picture has red, green, blue and opacity, with the lowest row first, shape (h, w, 4)
+        # lines are segments in the world [m], shape (s, 2, 3)
+        low, high = self.edges[0] - self.step, self.edges[-1] + self.step
+        margin = np.clip(cut.margin, low, high)  # infinite margins have contours
+        fine = _finer(_finer(margin).T).T
+        opacity = np.where(fine >= 0.0, INSIDE_OPACITY, OUTSIDE_OPACITY).astype(np.uint8)
+        found = contour_generator(cut.across, cut.up, margin, line_type=LineType.ChunkCombinedOffset)
+        lines = [(float(edge), _segments(found.lines(float(edge)), cut)) for edge in self.edges]
+        boundary = next(own for edge, own in lines if edge == 0.0)
+        others = np.concatenate([own for edge, own in lines if edge != 0.0])
+        marks = _marks(sorted(lines, key=lambda line: abs(line[0])), cut, unit)
+        return np.dstack((self.colors(fine), opacity)), boundary, others, marks
+
     def key(self, unit: ForceUnit) -> str:
         """HTML of the color legend."""
         edges = [_bare(edge, unit) for edge in self.edges]
@@ -69,22 +84,6 @@ INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # out of 255, so that the robot behin
 
 
 Marks: TypeAlias = list[tuple[str, Array]]  # labels and their positions [m], shape (3,)
-
-
-def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> tuple[NDArray[np.uint8], Array, Array, Marks]:
-    """Picture of a slice, lines where its margin is 0, lines at the borders of the other bands, and labels."""
-    # the picture has red, green, blue and opacity, with the lowest row first, shape (h, w, 4); lines are segments in
-    # the world [m], shape (s, 2, 3)
-    low, high = scale.edges[0] - scale.step, scale.edges[-1] + scale.step
-    margin = np.clip(cut.margin, low, high)  # infinite margins have contours
-    fine = _finer(_finer(margin).T).T
-    opacity = np.where(fine >= 0.0, INSIDE_OPACITY, OUTSIDE_OPACITY).astype(np.uint8)
-    found = contour_generator(cut.across, cut.up, margin, line_type=LineType.ChunkCombinedOffset)
-    lines = [(float(edge), _segments(found.lines(float(edge)), cut)) for edge in scale.edges]
-    boundary = next(own for edge, own in lines if edge == 0.0)
-    others = np.concatenate([own for edge, own in lines if edge != 0.0])
-    marks = _marks(sorted(lines, key=lambda line: abs(line[0])), cut, unit)
-    return np.dstack((scale.colors(fine), opacity)), boundary, others, marks
 
 
 def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> Marks:

@@ -130,8 +130,8 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     scene = trimesh.Scene()
     place = np.eye(4)
     place[:3, :3], place[:3, 3] = snapshot.pose.matrix, snapshot.pose.position
-    _add(scene, "frame", shapes.frame_solid(robot), STEEL)
-    winches = shapes.winch_solid(robot)
+    _add(scene, "frame", shapes.Solid.frame(robot), STEEL)
+    winches = shapes.Solid.winches(robot)
     if len(winches.faces):
         _add(scene, "winches", winches, DRUM)
     pulleys = zip(pulleys_of(robot).radius, shapes.pulley_rotations(robot, snapshot.pose), strict=True)
@@ -144,7 +144,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
         if run[0, 2] != run[1, 2]:
             name = f"dead length {i}" if known else f"dead length {i}, path not known"
             _add(scene, name, shapes.Solid.rod(run, thin), STEEL)
-    _add(scene, "platform", shapes.platform_solid(robot), PLATFORM if snapshot.solved else INFEASIBLE, place)
+    _add(scene, "platform", shapes.Solid.platform(robot), PLATFORM if snapshot.solved else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
     for i, course in enumerate(snapshot.courses(sag_scale)):
         gaps = np.flatnonzero(np.isnan(course[:, 0]))

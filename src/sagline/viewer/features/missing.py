@@ -197,7 +197,7 @@ class MissingFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Begin without a drawing."""
         self._page, self._panel, self._nodes = page, page.panel, Nodes(page.server.scene)
-        self._body = shapes.platform_solid(page.robot)
+        self._body = shapes.Solid.platform(page.robot)
         self._task: BackgroundTask = BackgroundTask(page.later)
         self._key: Key = ()  # key of the shown pose; () while it is feasible
         self._nearest: NearestFeasible | None = None  # nearest feasible pose of the key below

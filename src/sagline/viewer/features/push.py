@@ -29,7 +29,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import NO_SHADOW, Nodes
 from sagline.viewer.server import finite_numbers
-from sagline.viewer.shapes import Solid, placed_balls, platform_solid, readable
+from sagline.viewer.shapes import Solid, placed_balls, readable
 from sagline.viewer.tension_scale import ForceUnit
 
 FORCES: Final = 24  # trials per iteration, which divides the distance between the bounds of a limit by about 23
@@ -110,6 +110,14 @@ class PushResponse:
             return np.full(3, np.nan)
         return np.asarray((self.loaded.pose.rotation * self.state.pose.rotation.inv()).as_rotvec())
 
+    @property
+    def semi_axes(self) -> tuple[Array, Array]:
+        """Semi-axes of the compliance ellipsoid [m/N], ascending, (3,), and their directions as columns, (3, 3)."""
+        if not np.isfinite(self.compliance).all():
+            return np.full(3, np.nan), np.eye(3)
+        axes, values, _ = np.linalg.svd(self.compliance)
+        return values[::-1], axes[:, ::-1]
+
     def scaled_pose(self, factor: float) -> Pose | None:
         """Pose with the force; the motion from the pose without the force is multiplied by a factor."""
         if self.loaded is None:
@@ -117,14 +125,6 @@ class PushResponse:
         rest, rotation = self.state.pose, Rotation.from_rotvec(factor * self.rotation) * self.state.pose.rotation
         place = rest.transform(self.push.at) + factor * self.displacement
         return Pose(place - rotation.as_matrix() @ self.push.at, rotation)
-
-
-def semi_axes(compliance: Array) -> tuple[Array, Array]:
-    """Semi-axes of the compliance ellipsoid [m/N], ascending, (3,), and their directions, one per column, (3, 3)."""
-    if not np.isfinite(compliance).all():
-        return np.full(3, np.nan), np.eye(3)
-    axes, values, _ = np.linalg.svd(compliance)
-    return values[::-1], axes[:, ::-1]
 
 
 def _reserve(state: Equilibrium, unit: Push, largest: float) -> _Reserve:
@@ -224,7 +224,7 @@ def _reserve_text(response: PushResponse, reserve: _Reserve, unit: ForceUnit) ->
 def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
     if not np.isfinite(response.compliance).all():
         return "unlimited: no cable resists a motion in some direction"
-    least, middle, most = (n(1e3 * length, ".2g", "mm/N") for length in semi_axes(response.compliance)[0])
+    least, middle, most = (n(1e3 * length, ".2g", "mm/N") for length in response.semi_axes[0])
     drawn = "" if drawn_for is None else f"; drawn as for {n(drawn_for, '.3g', 'N')}"
     return f"{least}, {middle} and {most}{drawn}"
 
@@ -237,7 +237,7 @@ class PushFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Build the folder."""
         self._page, self._size, self._nodes = page, page.size, Nodes(page.server.scene)
-        self.body, self._ball = platform_solid(page.robot), Solid.ball()
+        self.body, self._ball = Solid.platform(page.robot), Solid.ball()
         mean = float(np.sqrt(page.scale.low * page.scale.high))
         self._stiffness = mean / (FAR * self._size)  # [N/m], force of a drag
         self.hold: tuple[int, Array] | None = None  # client, and the point that it drags, platform frame [m]
@@ -318,7 +318,7 @@ class PushFeature(Feature):
     def _show(self, response: PushResponse, error_scale: float) -> None:
         """Draw the force, the largest force in its direction, the displaced platform and the ellipsoid of stiffness."""
         nodes, size, unit, drawn_for = self._nodes, self._size, ForceUnit.of(response.state.one_robot), None
-        lengths, directions = semi_axes(response.compliance)
+        lengths, directions = response.semi_axes
         if self._ellipsoid.value and np.isfinite(lengths).all():
             drawn_for = readable(lengths, LARGE * size)
         start, arrow = response.state.pose.transform(response.push.at), response.push.force / self._stiffness

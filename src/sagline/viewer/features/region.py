@@ -20,7 +20,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, NO_SHADOW, PLATFORM, REST, Nodes
-from sagline.viewer.slices import MarginScale, Marks, picture_of
+from sagline.viewer.slices import MarginScale, Marks
 from sagline.viewer.snapshot import given_yaw
 from sagline.viewer.tension_scale import ForceUnit
 from sagline.workspaces.levels import Levels, Plane, slice_of
@@ -269,7 +269,7 @@ class RegionFeature(Feature):
         if self._slice_key != (self._key, plane):
             self._slice_key = (self._key, plane)
             cut = slice_of(levels.details, plane, region.low, region.high, (POINTS, POINTS))
-            self._draw_slice(plane, region, picture_of(cut, self._scale, unit))
+            self._draw_slice(plane, region, self._scale.picture(cut, unit))
 
     def _draw_slice(self, plane: Plane, region: Region, drawn: tuple[Any, Array, Array, Marks]) -> None:
         nodes, (image, boundary, lines, marks) = self._nodes, drawn

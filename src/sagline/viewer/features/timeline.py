@@ -38,7 +38,7 @@ class TimelineFeature(Feature):
         """Register the messages of browser/timeline.js."""
         player, channel = page.player, page.channel
         self._channel, self._player = channel, player
-        self._nodes, self._body = Nodes(page.server.scene), shapes.platform_solid(page.robot)
+        self._nodes, self._body = Nodes(page.server.scene), shapes.Solid.platform(page.robot)
         self._above = float(self._body.vertices[:, 2].max()) + NEAR * page.size
         self._played: Played | None = None  # played motion of the track
         self._number = player.number
