@@ -1,8 +1,7 @@
-"""Repetition of the article's experiment: a controller moves a machine from home to the ten poses and back home.
+"""Repetition of the article's experiment: a controller moves a machine from home to the ten poses and back home."""
 
-The published total duration, about 14 minutes, determines the speed and the durations of the stops, which are not
-published. The machine is a twin, whose true position is known.
-"""
+# The published total duration, about 14 minutes, determines the speed and the durations of the stops, which are not
+# published. The machine is a twin, whose true position is known.
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.core.arrays import Array, Flags
+from sagline.core.numbers import n
 from sagline.robot.batch import has_routing
 
 MODULUS, DENSITY, LOAD = "Young's modulus E", "linear density ρ", "load"
@@ -134,6 +135,19 @@ class Explanation(NamedTuple):
     def place(self, name: str) -> int:
         """Index of the parameter with the name `name`."""
         return [parameter.name for parameter in self.parameters].index(name)
+
+    def value(self, name: str) -> str:
+        """Text of the value of `name` with its standard uncertainty; a value at a limit has the mark "(limit)"."""
+        k = self.place(name)
+        number, unit = self.values[k], self.parameters[k].unit
+        if self.at_limit[k]:
+            return f"{n(number, '+.3g', unit)} (limit)"
+        return n(number, unit=unit, uncertainty=self.deviation[k])
+
+    @property
+    def text(self) -> str:
+        """Names and values of all parameters."""
+        return ", ".join(f"{parameter.name} {self.value(parameter.name)}" for parameter in self.parameters)
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:

@@ -201,15 +201,11 @@ def _best_explanations(study: TenPoses) -> Finding:
         two=two,
         three=three,
         second=second,
-        one_values=_values(one),
-        two_values=_values(two),
-        three_values=_values(three),
-        dead_cable=_told(beside[causes.DEAD], causes.DEAD),
-        modulus=_told(beside[causes.MODULUS], causes.MODULUS),
-        load=_told(beside[causes.LOAD], causes.LOAD),
+        dead_cable=beside[causes.DEAD].value(causes.DEAD),
+        modulus=beside[causes.MODULUS].value(causes.MODULUS),
+        load=beside[causes.LOAD].value(causes.LOAD),
         modulus_alone=alone[causes.MODULUS],
         density_alone=alone[causes.DENSITY],
-        second_values=_values(second),
     )
 
 
@@ -248,7 +244,7 @@ def _table_of_explanations(study: TenPoses) -> Table:
     rest = study.table.error - study.model_error
     rms, worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
     found = [("nothing off", rms, worst, rms, causes.corrected_aic(rms, rest.size, 0))]
-    found += [(_values(one), one.rms, one.worst, one.left_out, one.aicc) for group in shown for one in group]
+    found += [(one.text, one.rms, one.worst, one.left_out, one.aicc) for group in shown for one in group]
     return Table(
         f"No parameter, one parameter, and the best {SHOWN} with two and with three; in parentheses: uncertainty",
         ("off by", "remaining, rms [mm]", "remaining, worst pose [mm]", "left-out pose, rms [mm]", "AICc"),
@@ -266,7 +262,7 @@ def _panel(study: TenPoses, found: causes.Explanation, count: str) -> Drawing:
         ax.plot(height, 1e3 * study.table.error[:, axis], marker, color=color, markersize=4.5, label=f"{name} measured")
         look: dict[str, Any] = {"color": color, "markersize": 7.0, "markerfacecolor": "none"}
         ax.plot(height, 1e3 * found.predicted[:, axis], marker, **look, label=f"{name} explained")
-    return figure, f"Best explanation by {count}: {_values(found)}."
+    return figure, f"Best explanation by {count}: {found.text}."
 
 
 def _numbers(found: causes.Explanation) -> dict[str, Any]:
@@ -280,19 +276,6 @@ def _numbers(found: causes.Explanation) -> dict[str, Any]:
         "left_out_rms_mm": 1e3 * found.left_out,
         "aicc": found.aicc,
     }
-
-
-def _values(found: causes.Explanation) -> str:
-    return ", ".join(f"{parameter.name} {_told(found, parameter.name)}" for parameter in found.parameters)
-
-
-def _told(found: causes.Explanation, name: str) -> str:
-    """Text of the value of `name` with its standard uncertainty; a value at a limit has the mark "(limit)"."""
-    k = found.place(name)
-    value, unit = found.values[k], found.parameters[k].unit
-    if found.at_limit[k]:
-        return f"{n(value, '+.3g', unit)} (limit)"
-    return n(value, unit=unit, uncertainty=found.deviation[k])
 
 
 def _single_causes(study: TenPoses) -> Finding:

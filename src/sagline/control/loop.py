@@ -8,9 +8,8 @@ from sagline.control.active_states import ActiveState, Emergency, Holding, Off
 from sagline.control.context import Context
 from sagline.control.evidence import Cycle, Reaction
 from sagline.control.execution import ExecutionStatus
-from sagline.control.link import Command, Missing, Mode, Sample
+from sagline.control.link import Missing, Mode, Sample
 from sagline.control.recording import EventKind, Recorded
-from sagline.control.set_points import SetPoint
 from sagline.control.states import MOTION, OWNING, State
 from sagline.core.arrays import Array
 
@@ -41,44 +40,34 @@ class Loop:
         command, correction = c.sender.command, c.correction
         answer = c.link.exchange(command)
         c.time = answer.time
+        none = c.unknown, None, None, float("nan")
+        planned, row, wrench, clock = none if point is None else (point.tension, point.row, point.wrench, point.clock)
         sample = answer if isinstance(answer, Sample) else _aged(c.sample, answer)
         if sample is not None:
             before, c.sample = c.sample, sample
-            self._judge(sample, before, command, point, correction, late)
+            self._judge(Cycle(sample, before, command, planned, row, correction, late), wrench)
         if self.stop_requested:
             self.stop_requested = False
             self.active = self.active.stop()
         self.active = self.active.next(answer)
         if c.run.recording or c.journal.watched:
-            clock, planned = (float("nan"), c.unknown) if point is None else (point.clock, point.tension)
             about, pose = (c.number, c.state, c.degraded, late, clock), c.estimator
             estimate = pose.position, pose.quaternion, pose.status
             c.keep(Recorded(*about, command, answer, *estimate, c.zero, planned, correction))
         c.number += 1
 
-    def _judge(
-        self,
-        sample: Sample,
-        before: Sample | None,
-        command: Command | None,
-        point: SetPoint | None,
-        correction: Array,
-        late: float,
-    ) -> None:
+    def _judge(self, cycle: Cycle, wrench: Array | None) -> None:
         """Estimate the pose, check for faults, and react."""
         c = self.context
         if c.homed or c.shadow:
-            lost = c.locate(sample, None if point is None else point.wrench)
+            lost = c.locate(cycle.sample, wrench)
             if lost and c.state in FOLLOWING:
                 self.active = self.active.fail(lost)
         elif c.estimator.status >= 0:
             c.estimator.forget()
         if not c.shadow and c.state in UNWATCHED:
             return
-        planned, row = (c.unknown, None) if point is None else (point.tension, point.row)
-        reaction, line = c.find_faults(
-            Cycle(sample, before, command, planned, row, correction, late, self._recording_stopped())
-        )
+        reaction, line = c.find_faults(cycle._replace(recording=self._recording_stopped()))
         if c.shadow:
             return
         if reaction is Reaction.STOPPING:

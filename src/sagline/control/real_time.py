@@ -116,15 +116,8 @@ class Pace:
 
 
 def set_priority(priority: int) -> None:
-    """Give this thread a real-time priority (SCHED_FIFO of Linux), and all threads and processes that it starts.
-
-    Args:
-        priority: 1 to 99; the kernel's own threads have 50.
-
-    Raises:
-        InvalidValueError: If `priority` is out of range. If the permission is missing. If this system has no such
-            scheduler.
-    """
+    """Give this thread a real-time priority (SCHED_FIFO of Linux), and all threads and processes that it starts."""
+    # priority: 1 to 99; the kernel's own threads have 50
     level = whole_number(priority, "priority", 1, 99)
     if not hasattr(os, "sched_setscheduler"):
         raise InvalidValueError("priority", level, "none: only Linux has this scheduler", "Run without a priority.")

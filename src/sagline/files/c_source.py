@@ -1,8 +1,7 @@
-"""Source text for controllers: C99 of a robot's kinematics, translated from the kernels, and SCL for TIA Portal.
+"""Source text for controllers: C99 of a robot's kinematics, translated from the kernels, and SCL for TIA Portal."""
 
-When the package is built, `tools/translate/portable.py` translates the kernels in parts. The C source of a robot
-contains the parts that this robot needs, its data, and functions for the caller.
-"""
+# When the package is built, `tools/translate/portable.py` translates the kernels in parts. The C source of a robot
+# contains the parts that this robot needs, its data, and functions for the caller.
 
 from __future__ import annotations
 

@@ -67,11 +67,7 @@ class RecordedLog:
 
 
 class LogReader:
-    """Reader of a log that may still grow.
-
-    Attributes:
-        log: Content read so far.
-    """
+    """Reader of a log that may still grow; `log` is the content read so far."""
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
         """Store the path of the file. The method `more` reads the file."""

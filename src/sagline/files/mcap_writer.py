@@ -1,9 +1,8 @@
-"""Writing of MCAP logs, chunk by chunk. If the process is killed, all complete chunks can be read.
+"""Writing of MCAP logs, chunk by chunk. If the process is killed, all complete chunks can be read."""
 
-The topic `/record` contains all numbers; it has one message per chunk with the packed values of its cycles. Attachments
-contain the robot and the plans. All topics except `/record` are for other programs: `/cycle` and `/event` in JSON,
-`/tf` and `/scene` in the schemas of Foxglove.
-"""
+# The topic `/record` contains all numbers; it has one message per chunk with the packed values of its cycles.
+# Attachments contain the robot and the plans. All topics except `/record` are for other programs: `/cycle` and `/event`
+# in JSON, `/tf` and `/scene` in the schemas of Foxglove.
 
 from __future__ import annotations
 
@@ -174,12 +173,11 @@ def check_packages() -> None:
 
 
 class Recorder:
-    """Recording of a log: a separate thread writes the file while a controller or a twin runs.
+    """Recording of a log: a separate thread writes the file while a controller or a twin runs."""
 
-    Data are put into a queue, so that the caller never waits for a disk. If the queue or the disk is full, recording
-    stops permanently. The attribute `stopped` then gives the reason, and the file keeps the data written so far.
-    Numbers are rounded to the numbers of decimals in `DECIMALS`.
-    """
+    # Data are put into a queue, so that the caller never waits for a disk. If the queue or the disk is full, recording
+    # stops permanently. The attribute `stopped` then gives the reason, and the file keeps the data written so far.
+    # Numbers are rounded to the numbers of decimals in `DECIMALS`.
 
     def __init__(
         self,

@@ -1,12 +1,11 @@
-"""MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders.
+"""MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders."""
 
-The cylinders do not swivel. The platform end of a cable moves perpendicular to the chord by small distances: by u in
-the vertical plane of the cable, and by v out of this plane. If the pulley swivels, the cable becomes longer by u^2/(2
-l) + v^2 cos phi/(2 s), where l is the free length, and s is the distance of the platform end from the swivel axis. On a
-fixed cylinder, the cable becomes longer by v^2/(2 a), where a is the length from the first point to the end. The tendon
-therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at which the tendon leaves
-the cylinder. Force and stiffness are then the same as with a swiveling pulley.
-"""
+# The cylinders do not swivel. The platform end of a cable moves perpendicular to the chord by small distances: by u in
+# the vertical plane of the cable, and by v out of this plane. If the pulley swivels, the cable becomes longer by u^2/(2
+# l) + v^2 cos phi/(2 s), where l is the free length, and s is the distance of the platform end from the swivel axis. On
+# a fixed cylinder, the cable becomes longer by v^2/(2 a), where a is the length from the first point to the end. The
+# tendon therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at which the
+# tendon leaves the cylinder. Force and stiffness are then the same as with a swiveling pulley.
 
 from __future__ import annotations
 

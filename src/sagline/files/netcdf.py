@@ -1,9 +1,8 @@
-"""Formats of results, and NetCDF files with a digest at the end. Damaged files are not read.
+"""Formats of results, and NetCDF files with a digest at the end. Damaged files are not read."""
 
-An HDF5 file states its own length, and HDF5 ignores all bytes after it. The digest is therefore appended to the file.
-The digest is checked first, because reading a damaged file may take any amount of memory and time. A file without a
-digest is not read.
-"""
+# An HDF5 file states its own length, and HDF5 ignores all bytes after it. The digest is therefore appended to the file.
+# The digest is checked first, because reading a damaged file may take any amount of memory and time. A file without a
+# digest is not read.
 
 from __future__ import annotations
 

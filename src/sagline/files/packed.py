@@ -1,11 +1,10 @@
-"""Lossless compression of columns of numbers, and of data sets inside other files.
+"""Lossless compression of columns of numbers, and of data sets inside other files."""
 
-Measured and planned values are smooth in time. Each column is converted to integers. If all values have few digits
-after the point, the integers are the values times a power of ten. Otherwise the integers are the bits of the floats,
-changed so that larger numbers have larger integers. The integers are stored as differences of order 0 to 5; the
-order with the fewest bits is selected. The upper bytes of the differences are nearly all zero. Bytes of equal weight
-are stored together, because zstandard then compresses them strongly.
-"""
+# Measured and planned values are smooth in time. Each column is converted to integers. If all values have few digits
+# after the point, the integers are the values times a power of ten. Otherwise the integers are the bits of the floats,
+# changed so that larger numbers have larger integers. The integers are stored as differences of order 0 to 5; the order
+# with the fewest bits is selected. The upper bytes of the differences are nearly all zero. Bytes of equal weight are
+# stored together, because zstandard then compresses them strongly.
 
 from __future__ import annotations
 

@@ -37,11 +37,9 @@ _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*
 
 
 def plain_number(text: str) -> float | None:
-    """Read a number from a decimal text: digits 0 to 9 with optional point, sign and exponent, or inf or nan.
-
-    Other notations of YAML, Python or C are not accepted, for example 1:30, 0x10, 1_000 and digits of other alphabets.
-    None if the text is not a number. Only the word inf gives infinity; the text 1e999 gives the largest float64.
-    """
+    """Read a number from a decimal text: digits 0 to 9 with optional point, sign and exponent, or inf or nan."""
+    # Other notations of YAML, Python or C are not accepted, for example 1:30, 0x10, 1_000 and digits of other
+    # alphabets. None if the text is not a number. Only the word inf gives infinity; 1e999 gives the largest float64.
     found = _PLAIN.fullmatch(text) if len(text) <= _LONGEST else None
     if found is None:
         return None

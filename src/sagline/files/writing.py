@@ -1,9 +1,8 @@
-"""Atomic file writing, names of files, and JSON text.
+"""Atomic file writing, names of files, and JSON text."""
 
-A new file is written next to its target and then renamed in one step, so that the target is always complete. Folders,
-devices, pipes, sockets and links are refused as targets. The parent folders may be links. The new file has
-the permissions of the replaced file. If the replaced file had other hard links, they keep the old content.
-"""
+# A new file is written next to its target and then renamed in one step, so that the target is always complete. Folders,
+# devices, pipes, sockets and links are refused as targets. The parent folders may be links. The new file has the
+# permissions of the replaced file. If the replaced file had other hard links, they keep the old content.
 
 from __future__ import annotations
 
@@ -39,11 +38,10 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", r
 
 
 def file_stem(name: str, *words: str) -> str:
-    """File name for a robot, without a suffix. The name is never empty, hidden, too long, a path, or a device.
-
-    Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
-    other characters or is too long, eight digits of its digest are added, so that two robots never have the same files.
-    """
+    """File name for a robot, without a suffix. The name is never empty, hidden, too long, a path, or a device."""
+    # Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
+    # other characters or is too long, eight digits of its digest are added, so that two robots never have the same
+    # files.
     plain = unicodedata.normalize("NFC", name)
     # categories: letters, marks, numbers
     spaced = "".join(c if c in "._-" or unicodedata.category(c)[0] in "LMN" else " " for c in plain)

@@ -34,10 +34,9 @@ _WORDS: Final = {
 
 
 class YamlEntry(BaseModel):
-    """Base class of the schemas: only declared keys are allowed, and types are not converted.
+    """Base class of the schemas: only declared keys are allowed, and types are not converted."""
 
-    A quantity is declared with its unit: `mass: Annotated[Any, "kg"]`.
-    """
+    # a quantity is declared with its unit: `mass: Annotated[Any, "kg"]`
 
     model_config = ConfigDict(extra="forbid", strict=True)
 

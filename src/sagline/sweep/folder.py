@@ -1,8 +1,7 @@
-"""Folders of sweeps: a Zarr group with the request, and with one chunk per variable and task.
+"""Folders of sweeps: a Zarr group with the request, and with one chunk per variable and task."""
 
-The folder contains the whole request. A computer with access to the folder therefore needs only the number of a task to
-compute the task. The checksum of a chunk shows whether the chunk is complete.
-"""
+# The folder contains the whole request. A computer with access to the folder therefore needs only the number of a task
+# to compute the task. The checksum of a chunk shows whether the chunk is complete.
 
 from __future__ import annotations
 

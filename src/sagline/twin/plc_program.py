@@ -1,8 +1,7 @@
-"""Program of the PLC of one group: ownership, heartbeat, ramp, limits and hold.
+"""Program of the PLC of one group: ownership, heartbeat, ramp, limits and hold."""
 
-The SCL source has the same statements in the same order. The program uses plain numbers, so that a scan takes
-microseconds.
-"""
+# The SCL source has the same statements in the same order. The program uses plain numbers, so that a scan takes
+# microseconds.
 
 from __future__ import annotations
 
