@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike
 
 from sagline.article.regressions import fit_factor
 from sagline.cables.cable import Cable
-from sagline.cables.model import CableState
 from sagline.cables.models import Catenary, Empirical
 from sagline.core.arguments import check_memory, instance
-from sagline.core.arrays import Array, Flags, checked, kernel_input, number
+from sagline.core.arrays import Array, Flags, checked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
-from sagline.kernels.cable.batch import batch_end
 
 CONFIDENCE = 0.95
 POINT_BYTES = 400.0  # memory per combination of span, rise and tension during the fit
@@ -157,32 +155,14 @@ def identify_empirical(
     k_p = _estimate(shape, exact.unstrained_length - exact.chord / stretch)
     model = Empirical(k_h.value, k_p.value)
     found = model.from_tension(cable, span, rise, chord_tension, gravity)
+    ends = Catenary().profile(cable, found, points=2)[..., -1, :]  # of exact cables
     return EmpiricalFit(
         *(model, k_h, k_p, cable, gravity, *axes),
         force_residual=found.vertical_force - exact.vertical_force,
         length_residual=found.unstrained_length - exact.unstrained_length,
-        position_error=_end_position_error(found),
+        position_error=np.asarray(np.abs(ends[..., 0] - span) + np.abs(ends[..., 1] - rise)),
         cable_weight=exact.cable_weight,
     )
-
-
-def _end_position_error(state: CableState) -> Array:
-    """Position error |dx| + |dz| [m] of equation (20): distance between B_d and the ends of exact cables."""
-    # `state` may come from any cable model; the errors have the shape of `state`
-    shape = state.shape
-    horizontal, vertical, length, weight, stiffness = (
-        kernel_input(operand, shape).reshape(-1)
-        for operand in (
-            state.horizontal_tension,
-            state.vertical_force,
-            state.unstrained_length,
-            state.cable.linear_density * state.gravity,
-            state.cable.axial_stiffness,
-        )
-    )
-    x, z = np.empty(horizontal.size), np.empty(horizontal.size)
-    batch_end(horizontal, vertical, length, weight, stiffness, x, z)
-    return np.asarray(np.abs(x.reshape(shape) - state.span) + np.abs(z.reshape(shape) - state.rise))
 
 
 def _estimate(shape: Array, value: Array) -> Estimate:

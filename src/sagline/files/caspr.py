@@ -14,7 +14,7 @@ from sagline.core.arguments import file_path, optional, text
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files import robot_xml as xml
-from sagline.files.reading import exists, value_errors
+from sagline.files.reading import value_errors
 from sagline.files.robot_xml import Imported
 from sagline.robot.checks import MotionPattern
 from sagline.robot.robot import Robot
@@ -90,7 +90,7 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
 
 def _files(source: Path) -> tuple[Path, Path]:
     """Paths of the files of bodies and of cables. If `source` is a file, other files of its kind are ignored."""
-    if not exists(source):
+    if not os.path.exists(source):  # False for a name that no file can have
         raise FileError(source, "does not exist", "Check its name.")
     folder = source if source.is_dir() else source.parent
     folder = folder.parent if folder.name == "cables" else folder

@@ -57,15 +57,6 @@ def _unreadable(path: Path, error: Exception) -> FileError:
     return FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.")
 
 
-def exists(path: Path) -> bool:
-    """True if `path` exists. The result is False for a name that no file can have."""
-    try:
-        path.stat()
-    except (OSError, ValueError):
-        return False
-    return True
-
-
 def read_bytes(path: Path, limit: float) -> bytes:
     """Read a regular file of at most `limit` MB. Pipes and devices are not opened, because they may never end."""
     most = int(limit * MEGABYTE)

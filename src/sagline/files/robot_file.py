@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sagline.core.arguments import brief, file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError, did_you_mean
-from sagline.files.reading import exists, read_text, value_errors
+from sagline.files.reading import read_text, value_errors
 from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validate
 from sagline.robot.catalogue import preset_text, robot_names
@@ -160,7 +160,7 @@ def _winches(winches: Winch) -> dict[str, Any]:
 def _is_name(text: str, path: Path) -> bool:
     if text in robot_names():
         return True
-    return path.suffix not in {".yaml", ".yml"} and path.name == text and not exists(path)
+    return path.suffix not in {".yaml", ".yml"} and path.name == text and not os.path.exists(path)
 
 
 def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,12 +98,6 @@ def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
         marks = TaskMarks(folder, file, _read_marks(folder))
         marks.begin()
         yield marks
-
-
-def _total_of(marks: Mapping[int, TaskMark]) -> Counts:
-    """Sum of the outcomes of all finished tasks."""
-    counts = np.array([counts for _, counts in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
-    return Counts(*counts.sum(axis=0).tolist())
 
 
 def _time_text(seconds: float) -> str:
@@ -228,4 +222,6 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
     opened = open_folder(path)
     marks = _read_marks(opened)
     seconds = sum(seconds for seconds, _ in marks.values())
-    return Sweep(path, opened.request, opened.tasks, len(marks), _total_of(marks), seconds)
+    outcomes = np.array([counts for _, counts in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
+    counts = Counts(*outcomes.sum(axis=0).tolist())
+    return Sweep(path, opened.request, opened.tasks, len(marks), counts, seconds)

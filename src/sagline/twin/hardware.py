@@ -14,7 +14,6 @@ from sagline.dynamics.simulation.simulate import highest_frequency
 from sagline.dynamics.simulation.simulator import Reading, Simulator
 from sagline.dynamics.simulation.winches import drive_data
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.kernels.cable.drum import lengths_of_turns, turns_of_lengths
 from sagline.kernels.dynamics import drives as d
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
@@ -39,11 +38,10 @@ class _EncoderScale:
         each = winch.gear * winch.counts_per_turn
         # per_meter: counts per meter of unstrained paid-out cable, at the reference lengths, (m,)
         self.per_meter = each * stretch / (2.0 * np.pi * drum_lever(robot, length))
-        self._drums = None
+        self._drums: Drums | None = None
         if winch.groove_pitch is not None and robot.cables.diameter is not None:
-            drums = Drums.of(robot)
-            self._drums = (drums.table, drums.starts)
-            self._stretch, self._each, self._work = stretch, each, np.empty((3, 1, robot.cable_count))
+            self._drums = drums = Drums.of(robot)
+            self._stretch, self._each = stretch, each
             self._at_no_turns = counts + each * drums.turns((length * stretch)[None])[0][0]
         else:
             self._at_no_length = counts - length * self.per_meter
@@ -51,24 +49,16 @@ class _EncoderScale:
     def counts(self, length: Array) -> Array:
         """Convert unstrained lengths off the drums [m] to counts of the encoders, not rounded."""
         if self._drums is None:
-            found: Array = length * self.per_meter + self._at_no_length
-            return found
-        path, turns, travel = self._work
-        np.multiply(length, self._stretch, out=path[0])
-        turns_of_lengths(*self._drums, path, turns, travel)
-        found = self._at_no_turns - turns[0] * self._each
-        return found
+            return np.asarray(length * self.per_meter + self._at_no_length)
+        turns, _ = self._drums._turns((length * self._stretch)[None])
+        return np.asarray(self._at_no_turns - turns[0] * self._each)
 
     def lengths(self, counts: Array) -> Array:
         """Convert counts of the encoders to unstrained lengths off the drums [m]."""
         if self._drums is None:
-            found: Array = (counts - self._at_no_length) / self.per_meter
-            return found
-        path, turns, _ = self._work
-        np.divide(self._at_no_turns - counts, self._each, out=turns[0])
-        lengths_of_turns(*self._drums, turns, path)
-        found = path[0] / self._stretch
-        return found
+            return np.asarray((counts - self._at_no_length) / self.per_meter)
+        turns = (self._at_no_turns - counts) / self._each
+        return np.asarray(self._drums.lengths(turns[None])[0] / self._stretch)
 
 
 SHARE: Final = 0.2  # largest phase of the highest mode in a step [rad]
