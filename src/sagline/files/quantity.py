@@ -48,6 +48,11 @@ def plain_number(text: str) -> float | None:
     return _limit(float(text))
 
 
+def within_reach(number: float) -> bool:
+    """True if a number is finite and so small that products of a few such numbers do not overflow."""
+    return abs(number) <= LARGEST
+
+
 def in_si(value: object, unit: str, item: str) -> Nested:
     """Convert a quantity, or nested lists of quantities, to numbers in the SI unit `unit`."""
     if isinstance(value, list | tuple):
@@ -56,7 +61,7 @@ def in_si(value: object, unit: str, item: str) -> Nested:
     if number is None or isnan(number):
         wanted = f'a number in {unit}, or text with a unit that converts to it, such as "1.5 {unit}"'
         raise InvalidValueError(item, reprlib.repr(value), wanted if unit else "a number", f"Correct {item}.")
-    if not (isinf(number) or abs(number) <= LARGEST):
+    if not (isinf(number) or within_reach(number)):
         raise InvalidValueError(item, reprlib.repr(value), f"{REACH} {unit}".rstrip(), f"Correct {item}.")
     return number
 

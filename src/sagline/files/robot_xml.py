@@ -16,7 +16,7 @@ import numpy as np
 from sagline.cables.cable import Cable
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.quantity import LARGEST, plain_number
+from sagline.files.quantity import plain_number, within_reach
 from sagline.files.reading import error_at_line, read_bytes
 from sagline.robot.robot import Robot
 from sagline.robot.winch import UPRIGHT
@@ -54,7 +54,7 @@ def read_xml(path: Path) -> Element:
 def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array:
     """Read `count` numbers separated by blanks. If one is wrong, InvalidValueError names `item` and `unit`."""
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
-    values = [number for number in found if number is not None and abs(number) <= LARGEST]
+    values = [number for number in found if number is not None and within_reach(number)]
     if len(found) != count or len(values) != count:
         shown = "missing" if text is None or not text.strip() else repr(text.strip()[:60])
         wanted = "a number" if count == 1 else f"{count} numbers between blanks"

@@ -27,7 +27,7 @@ from sagline.core.arguments import file_path
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError
 from sagline.files.quantity import plain_number
-from sagline.files.reading import exists, read_text
+from sagline.files.reading import read_text
 from sagline.files.writing import check_file, check_files, create_folder, json_text, try_lock, write_text
 from sagline.optimization.request import Request, heading
 
@@ -74,7 +74,7 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     try:
         if not try_lock(handle, if_unknown=True):
             raise FileError(place, "is in use by another process", "Wait for that process, or give another folder.")
-        if not exists(place / REQUEST):
+        if not os.path.exists(place / REQUEST):
             stored = {"request": digest, "robot": request.robot.name, "optimizer": request.optimizer}
             write_text(place / REQUEST, json_text({**stored, "seed": request.seed}) + "\n")
         known, whole = _read(file, heads)
@@ -105,8 +105,8 @@ def _canonical(value: Any) -> str:
 def _check_request(place: Path, digest: str, request: Request) -> None:
     """Raise an error if the folder contains the record of another search."""
     file = place / REQUEST
-    if not exists(file):
-        if exists(place / EVALUATIONS):
+    if not os.path.exists(file):
+        if os.path.exists(place / EVALUATIONS):
             raise FileError(place / EVALUATIONS, f"has no {REQUEST} in its folder, so its search is not known", ANOTHER)
         return
     try:
