@@ -6,7 +6,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 from sagline import FileError
-from sagline.files.reading import HDF_BEGIN, exists, read_bytes, read_text
+from sagline.files.reading import HDF_BEGIN, read_bytes, read_text
 from tests.files.wording import wording
 from tests.refusal import refused
 
@@ -55,7 +55,7 @@ def test_special_files_are_not_opened(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["none", "a" * 300, "a\0b", "a\ud800b", "a/" * 3000])
 def test_impossible_names(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
-    assert not exists(path)
+    assert not os.path.exists(path)
     with refused(kind=FileError, file=path) as caught:
         read_bytes(path, 1.0)
     assert len(str(caught.value)) < 300

@@ -60,13 +60,9 @@ def finding(
     """Create the finding `key` with texts that contain values from `numbers` and `words`; `numbers` are also saved."""
     entry, known = _texts()["findings"][key], numbers or {}
     statement, measured = (_Numbers().format(entry.get(part, ""), **{**known, **words}) for part in _PARTS)
+    chosen = Verdict[entry["verdict"]] if verdict is None else verdict
     return Finding(
-        key=key,
-        title=entry["title"],
-        statement=statement,
-        measured=measured,
-        verdict=Verdict[entry["verdict"]] if verdict is None else verdict,
-        numbers=known,
+        *(key, entry["title"], statement, measured, chosen, known),
         figures=tuple(entry.get("figures", ())),
         tables=tuple(entry.get("tables", ())),
         panels=tuple(panel_of(f"{key}-{k}", *drawing) for k, drawing in enumerate(panels)),

@@ -61,18 +61,10 @@ def feasible_sets(
     curve = model.from_tension(cable, end.span, end.rise, tensions * stretch, GRAVITY)
     lengths = model.from_tension(cable, end.span, end.rise, psi_tensions * stretch, GRAVITY).unstrained_length
     outline = np.asarray(end) + tolerance * _diamond(points)
-    psi = model.from_length(cable, outline[:, 0], outline[:, 1], lengths[:, None], GRAVITY)
-    return _FeasibleSets(
-        cable=cable,
-        end=end,
-        tolerance=tolerance,
-        psi_lengths=lengths,
-        psi=np.stack((psi.horizontal_tension, psi.vertical_force), axis=-1),
-        tensions=curve.horizontal_tension,
-        vertical=curve.vertical_force,
-        lengths=curve.unstrained_length,
-        line=fit_line(curve.horizontal_tension, curve.vertical_force),
-    )
+    around = model.from_length(cable, outline[:, 0], outline[:, 1], lengths[:, None], GRAVITY)
+    psi = np.stack((around.horizontal_tension, around.vertical_force), axis=-1)
+    found = curve.horizontal_tension, curve.vertical_force, curve.unstrained_length
+    return _FeasibleSets(cable, end, tolerance, lengths, psi, *found, line=fit_line(*found[:2]))
 
 
 def _diamond(points: int) -> Array:

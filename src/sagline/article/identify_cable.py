@@ -217,14 +217,9 @@ def _fit(
     unit = np.where(scale < 1.0, scale, values)  # derivative of the value by the solver's unknown
     freedom = max(length.size - len(names), 1)
     rest = residuals(unknown)
-    return CableFit(
-        cable=cable,
-        names=names,
-        values=locked(values),
-        covariance=locked(covariance * np.outer(unit, unit)),
-        residuals=locked(rest),
-        chi_squared=float(np.sum((rest / spread) ** 2) / freedom),
-    )
+    chi_squared = float(np.sum((rest / spread) ** 2) / freedom)
+    covariance = covariance * np.outer(unit, unit)
+    return CableFit(cable, names, locked(values), locked(covariance), locked(rest), chi_squared)
 
 
 def _checked_start(start: Cable | None) -> Cable:

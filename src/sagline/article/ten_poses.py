@@ -106,10 +106,7 @@ def ten_poses() -> TenPoses:
     ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(MOST))
     imitated, single_zero = _limits(robot, error_of, plan, ranked[1][0])
     return TenPoses(
-        table=table,
-        plan=plan,
-        home=home,
-        model_error=nominal,
+        *(table, plan, home, nominal),
         height_line=fit_line(table.desired[:, 2], table.error[:, 2]),
         trends={parameter.name: error for parameter, error in zip(causes.PARAMETERS, off, strict=True)},
         explanations=ranked,

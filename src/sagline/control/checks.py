@@ -83,17 +83,8 @@ def plan_motion(
     _check_steps(np.minimum(ticked.time, path.time[-1] - path.time[0]), plan.unstrained_length, rate)
     last = np.array(rate)
     last[-1] = 0.0
-    return Motion(
-        period=period,
-        plan=plan,
-        state=plan.state,
-        length=plan.unstrained_length,
-        rate=locked(last),
-        tension=plan.state.cables.frame_end_tension,
-        drum_tension=drum,
-        wrench=plan.state.wrench,
-        gains=gains_along(plan),
-    )
+    state, length, tension = plan.state, plan.unstrained_length, plan.state.cables.frame_end_tension
+    return Motion(period, plan, state, length, locked(last), tension, drum, state.wrench, gains_along(plan))
 
 
 def check_lead(what: str, lead: Array) -> None:

@@ -174,17 +174,9 @@ def execution_of(
     """Create an execution from the cycles in `table`; `period` [s]; `zero` [m], (m,)."""
     rows: Any = table.rows
     names, sample = rows.dtype.names, rows["sample"]
-    return Execution(
-        robot=robot,
-        plan=plan,
-        status=status,
-        reason=reason,
-        period=period,
-        zero=locked(zero.copy()),
-        events=events,
-        samples=Samples(locked(rows["time"]), **{name: locked(sample[name]) for name in sample.dtype.names}),
-        **{name: locked(rows[name]) for name in names if name != "sample"},
-    )
+    samples = Samples(locked(rows["time"]), **{name: locked(sample[name]) for name in sample.dtype.names})
+    cycles = {name: locked(rows[name]) for name in names if name != "sample"}
+    return Execution(robot, plan, status, reason, period, locked(zero.copy()), events, samples=samples, **cycles)
 
 
 def planned_position(execution: Execution) -> Array:

@@ -262,17 +262,9 @@ def winch_jog(
             k, i = (int(index) for index in np.argwhere(leaves)[0])
             reason = f"cable {i} would have {tension[k, i]:.3g} N; allowed: its {name}, {limit[i]:.3g} N"
             raise RefusedError(what, reason, step)
-    return Motion(
-        period=period,
-        plan=None,
-        state=found.state,
-        length=lengths,
-        rate=rates,
-        tension=found.state.cables.frame_end_tension,
-        drum_tension=drum_tension(found.state),
-        wrench=np.zeros((len(lengths), 6)),
-        gains=None,
-    )
+    state, wrench = found.state, np.zeros((len(lengths), 6))
+    tension, drum = state.cables.frame_end_tension, drum_tension(state)
+    return Motion(period, None, state, lengths, rates, tension, drum, wrench, gains=None)
 
 
 class PlatformJog:
