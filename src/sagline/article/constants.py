@@ -127,21 +127,20 @@ def _limit(scaled: Sequence[fits.Constants]) -> Finding:
         away = [100.0 * abs(abs(getattr(c, name)) / limit - 1.0) for c in scaled]
         ax.semilogy(FACTORS, away, color=color, marker="o", markersize=3.0, linewidth=1.1, label=labels[name])
     _logarithmic(ax, tuple(FACTORS.astype(int)))
+    shown = table_of(
+        "The constants by the article's regressions",
+        ("factor", [*(f"{factor:g}" for factor in FACTORS), "limit"], ""),
+        ("lowest T_x [N]", [*(c.lowest for c in scaled), "∞"], ",.0f"),
+        ("highest T_x [N]", [*(c.highest for c in scaled), "∞"], ",.0f"),
+        ("k_h platform end [m/s²]", [*(c.k_h_platform for c in scaled), fits.SHALLOW_K_H], "+.5f"),
+        ("k_h frame end [m/s²]", [*(c.k_h_frame for c in scaled), -fits.SHALLOW_K_H], ".5f"),
+        ("k_p [m²/s⁴]", [*(c.k_p for c in scaled), fits.SHALLOW_K_P], ".5f"),
+    )
     return finding(
         "taut-limit",
         numbers={"scaled": [c._asdict() for c in scaled], "factors": FACTORS, "g_squared_over_24": fits.SHALLOW_K_P},
         panels=((figure, "Deviation of |k_h| from g/2, and of k_p from g²/24."),),
-        data=(
-            table_of(
-                "The constants by the article's regressions",
-                ("factor", [*(f"{factor:g}" for factor in FACTORS), "limit"], ""),
-                ("lowest T_x [N]", [*(c.lowest for c in scaled), "∞"], ",.0f"),
-                ("highest T_x [N]", [*(c.highest for c in scaled), "∞"], ",.0f"),
-                ("k_h platform end [m/s²]", [*(c.k_h_platform for c in scaled), fits.SHALLOW_K_H], "+.5f"),
-                ("k_h frame end [m/s²]", [*(c.k_h_frame for c in scaled), -fits.SHALLOW_K_H], ".5f"),
-                ("k_p [m²/s⁴]", [*(c.k_p for c in scaled), fits.SHALLOW_K_P], ".5f"),
-            ),
-        ),
+        data=(shown,),
         factor=FACTORS[-1],
         last=scaled[-1],
     )
@@ -175,18 +174,8 @@ def sag_chapter() -> Chapter:
     end = fits.End.at_angle(CHORD)
     stiff, soft, printed, right = fits.stretch_study(fits.simulated_cable(), end, TENSIONS)
     sag = fits.sag_study(fits.published_sampling())
-    return chapter(
-        "sag",
-        (
-            _with_stretch(stiff, soft),
-            _relieved(stiff, printed, right),
-            _tension(sag),
-            _chord(sag),
-            _angle(sag),
-            _density(sag),
-        ),
-        chord=CHORD,
-    )
+    fitted = [find(sag) for find in (_tension, _chord, _angle, _density)]
+    return chapter("sag", [_with_stretch(stiff, soft), _relieved(stiff, printed, right), *fitted], chord=CHORD)
 
 
 def _with_stretch(stiff: CableState, soft: CableState) -> Finding:
@@ -215,14 +204,9 @@ def _relieved(stiff: CableState, printed: Array, right: Array) -> Finding:
     second, bx = axes("$|T|$ [N]", "error of $d$ [mm]")
     bx.plot(force, off, color=VERMILLION, linewidth=1.3, label="(36), (38)")
     bx.plot(force, left, color=GREEN, linewidth=1.3, label="without stretch by the mean tension")
-    return finding(
-        "stretch-removed",
-        numbers=numbers,
-        panels=(
-            (figure, "d over |T|: of the cable that does not stretch, and of the elastic cable with (38)."),
-            (second, "The difference between both."),
-        ),
-    )
+    caption = "d over |T|: of the cable that does not stretch, and of the elastic cable with (38)."
+    panels = (figure, caption), (second, "The difference between both.")
+    return finding("stretch-removed", numbers=numbers, panels=panels)
 
 
 def _tension(study: fits.SagStudy) -> Finding:

@@ -242,17 +242,9 @@ def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, m
     rms = float(np.sqrt(np.mean(rest**2)))
     low, high = _limits(model)
     at_limit = (values >= (1.0 - NEAR) * high) | (values <= low + NEAR * high)
-    return Explanation(
-        parameters=model,
-        values=values,
-        deviation=_deviation(slopes, ~at_limit, rest),
-        at_limit=at_limit,
-        predicted=predicted,
-        rms=rms,
-        worst=float(np.linalg.norm(rest, axis=1).max()),
-        aicc=corrected_aic(rms, rest.size, len(model)),
-        left_out=_left_out(model, values, slopes, rest),
-    )
+    deviation, worst = _deviation(slopes, ~at_limit, rest), float(np.linalg.norm(rest, axis=1).max())
+    aicc, left_out = corrected_aic(rms, rest.size, len(model)), _left_out(model, values, slopes, rest)
+    return Explanation(model, values, deviation, at_limit, predicted, rms, worst, aicc, left_out)
 
 
 def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:

@@ -77,19 +77,15 @@ def _limits(fit: EmpiricalFit) -> Finding:
         {"tolerance_m": each, "tension_min_N": fit.tension_min(each), "weight_max_N": fit.weight_max(each)}
         for each in TOLERANCES
     ]
+    shown = table_of(
+        "Limits that keep the position error (20) below a tolerance",
+        ("tolerance", [n(1e3 * each, unit="mm") for each in TOLERANCES], ""),
+        ("T_x,min [N]", [limit["tension_min_N"] for limit in limits], ".3g"),
+        ("w_max, all tensions [N]", [limit["weight_max_N"] for limit in limits], ".2f"),
+        ("w_max, T_x ≥ 100 N [N]", [fit.weight_max(each, 100.0) for each in TOLERANCES], ".2f"),
+    )
     return finding(
-        "validity-limits",
-        numbers={"limits": limits},
-        panels=((figure, caption, "position error"),),
-        data=(
-            table_of(
-                "Limits that keep the position error (20) below a tolerance",
-                ("tolerance", [n(1e3 * each, unit="mm") for each in TOLERANCES], ""),
-                ("T_x,min [N]", [limit["tension_min_N"] for limit in limits], ".3g"),
-                ("w_max, all tensions [N]", [limit["weight_max_N"] for limit in limits], ".2f"),
-                ("w_max, T_x ≥ 100 N [N]", [fit.weight_max(each, 100.0) for each in TOLERANCES], ".2f"),
-            ),
-        ),
+        "validity-limits", numbers={"limits": limits}, panels=((figure, caption, "position error"),), data=(shown,)
     )
 
 

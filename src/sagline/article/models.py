@@ -57,12 +57,8 @@ def sufficient_models(length_error: Array, tolerance: float) -> Array:
 def models_chapter() -> Chapter:
     """Chapter about the choice of the cable model in a controller."""
     cable = simulated_cable()
-    return chapter(
-        "models",
-        (_maps(), _sufficient(), _slices(), _examples()),
-        axial_stiffness=cable.axial_stiffness,
-        reference=REFERENCE,
-    )
+    findings = _maps(), _sufficient(), _slices(), _examples()
+    return chapter("models", findings, axial_stiffness=cable.axial_stiffness, reference=REFERENCE)
 
 
 def _study(**varied: Array) -> tuple[Array, Array]:
@@ -151,11 +147,7 @@ def _slices() -> Finding:
             ax.set_xscale("log")
         panels.append((figure, f"Over the {label.split(' [')[0]}."))
         worst[quantity] = {name: float(row.max()) for name, row in zip(NAMES[:-1], error, strict=False)}
-    return finding(
-        "length-error-slices",
-        numbers={"largest_error_mm": worst},
-        panels=panels,
-    )
+    return finding("length-error-slices", numbers={"largest_error_mm": worst}, panels=panels)
 
 
 def _examples() -> Finding:
@@ -165,20 +157,11 @@ def _examples() -> Finding:
         errors = _study(chord=np.array([chord]), tension=np.array([tension]))
         length, force = 1e3 * errors[0].ravel(), errors[1].ravel()
         weight = density * GRAVITY * chord
-        rows.append(
-            (
-                f"{n(chord, unit='m')}, {n(tension, unit='N')}, wD/τ = {n(weight / tension, '.2g')}",
-                *(n(x, "+.2g", "mm") for x in length[:-1]),
-            )
-        )
-        numbers.append(
-            {
-                "chord_m": chord,
-                "tension_N": tension,
-                "length_error_mm": dict(zip(NAMES, length, strict=True)),
-                "force_error_N": dict(zip(NAMES, force, strict=True)),
-            }
-        )
+        name = f"{n(chord, unit='m')}, {n(tension, unit='N')}, wD/τ = {n(weight / tension, '.2g')}"
+        rows.append((name, *(n(x, "+.2g", "mm") for x in length[:-1])))
+        off = {"length_error_mm": length, "force_error_N": force}
+        off_by_model = {each: dict(zip(NAMES, values, strict=True)) for each, values in off.items()}
+        numbers.append({"chord_m": chord, "tension_N": tension, **off_by_model})
     return finding(
         "model-examples",
         numbers={"angle_below_level_deg": -np.degrees(REFERENCE["angle"]), "examples": numbers},

@@ -21,24 +21,24 @@ AREA = 2e4  # area of a circle that shows an error, per meter of the error [pt^2
 def poses_chapter() -> Chapter:
     """Chapter about the ten poses of the prototype, and about possible causes of their errors."""
     study = ten_poses()
-    return chapter(
-        "poses",
-        (
-            _table(study),
-            _single_causes(study),
-            _tour(),
-            _space(study),
-            _trends(study),
-            _best_explanations(study),
-            _limits_of_ten_points(study),
-        ),
-    )
+    last = [find(study) for find in (_space, _trends, _best_explanations, _limits_of_ten_points)]
+    return chapter("poses", [_table(study), _single_causes(study), _tour(), *last])
 
 
 def _table(study: TenPoses) -> Finding:
     table, plan = study.table, study.plan
     difference = np.abs(table.distance - table.printed_error).max()
     model = np.linalg.norm(study.model_error, axis=1).max()
+    shown = table_of(
+        "The ten poses, with their plan by sagline",
+        ("pose", table.points, ""),
+        ("desired x, y, z [m]", [", ".join(n(x, ".2f") for x in place) for place in table.desired], ""),
+        ("error x, y, z [mm]", [", ".join(n(1e3 * x, ".0f") for x in error) for error in table.error], ""),
+        ("distance [mm]", 1e3 * table.distance, ".4f"),
+        ("printed [mm]", 1e3 * table.printed_error, ".4f"),
+        ("L planned [m]", [_span(each, ".3f") for each in plan.unstrained_length], ""),
+        ("tension at the winch [N]", [_span(each, ".0f") for each in plan.state.cables.frame_end_tension], ""),
+    )
     return finding(
         "table-2",
         numbers={
@@ -49,18 +49,7 @@ def _table(study: TenPoses) -> Finding:
             "horizontal_tension_N": plan.horizontal_tension,
             "frame_end_tension_N": plan.state.cables.frame_end_tension,
         },
-        data=(
-            table_of(
-                "The ten poses, with their plan by sagline",
-                ("pose", table.points, ""),
-                ("desired x, y, z [m]", [", ".join(n(x, ".2f") for x in place) for place in table.desired], ""),
-                ("error x, y, z [mm]", [", ".join(n(1e3 * x, ".0f") for x in error) for error in table.error], ""),
-                ("distance [mm]", 1e3 * table.distance, ".4f"),
-                ("printed [mm]", 1e3 * table.printed_error, ".4f"),
-                ("L planned [m]", [_span(each, ".3f") for each in plan.unstrained_length], ""),
-                ("tension at the winch [N]", [_span(each, ".0f") for each in plan.state.cables.frame_end_tension], ""),
-            ),
-        ),
+        data=(shown,),
     )
 
 
@@ -142,17 +131,16 @@ def _trends(study: TenPoses) -> Finding:
         "Measured vertical errors over height, and trends that single parameters predict.",
         "Trends of the other parameters.",
     )
+    shown = Table(
+        "Predicted vertical error [mm] at the ten poses, and its slope over height [mm/m]",
+        ("off by", *study.table.points, "slope"),
+        rows,
+    )
     return finding(
         "one-parameter-off",
         numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": 1e3 * study.height_line.slope},
         panels=[(figure, caption) for (figure, _), caption in zip(pairs, captions, strict=True)],
-        data=(
-            Table(
-                "Predicted vertical error [mm] at the ten poses, and its slope over height [mm/m]",
-                ("off by", *study.table.points, "slope"),
-                rows,
-            ),
-        ),
+        data=(shown,),
         stiffer=slopes[causes.MODULUS],
         falling=", ".join(falling),
     )
@@ -214,6 +202,11 @@ def _limits_of_ten_points(study: TenPoses) -> Finding:
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {causes.PULLEY, causes.ANCHORS} for found in few)
     zeros = 1e3 * study.single_zero
+    shown = Table(
+        "Standard deviation of the zero offset of each cable, if it is estimated from ten points",
+        ("", *(f"cable {i}" for i in range(zeros.size))),
+        [("zero offset of its length [mm]", *(n(x, ".0f") for x in zeros))],
+    )
     return finding(
         "ten-points",
         numbers={
@@ -226,13 +219,7 @@ def _limits_of_ten_points(study: TenPoses) -> Finding:
             "best_two_over_printing": study.best(2).rms / PRINTING,
             "pulley_or_anchor_height_in_all_of_them": named,
         },
-        data=(
-            Table(
-                "Standard deviation of the zero offset of each cable, if it is estimated from ten points",
-                ("", *(f"cable {i}" for i in range(zeros.size))),
-                [("zero offset of its length [mm]", *(n(x, ".0f") for x in zeros))],
-            ),
-        ),
+        data=(shown,),
         every="Every" if named else "Not every",
         least_zero=zeros.min(),
         largest_zero=zeros.max(),

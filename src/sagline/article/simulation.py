@@ -153,18 +153,8 @@ NEAR = 1.05  # a tension is near its minimum if it is less than this multiple of
 def simulation_chapter() -> Chapter:
     """Chapter about both robots along the path."""
     study = path_study()
-    return chapter(
-        "simulation",
-        (
-            _robots(study),
-            _path(study.path),
-            _courses(study),
-            _error(study),
-            _comparison(study),
-            _models(study),
-            _low_tension(),
-        ),
-    )
+    findings = [find(study) for find in (_robots, _path, _courses, _error, _comparison, _models)]
+    return chapter("simulation", [*findings, _low_tension()])
 
 
 def _robots(study: PathStudy) -> Finding:
@@ -179,7 +169,8 @@ def _robots(study: PathStudy) -> Finding:
     return finding("robots", panels=panels)
 
 
-def _path(path: sl.Path) -> Finding:
+def _path(study: PathStudy) -> Finding:
+    path = study.path
     figure, ax = axes("", "")
     draw_path(path, ax)
     figure.subplots_adjust(bottom=0.16, top=0.92)
@@ -311,6 +302,11 @@ def _models(study: PathStudy) -> Finding:
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         panels.append((figure, f"Position errors of four models, {robot}; the exact model is the reference."))
+    shown = Table(
+        "Distance from the plan [mm], highest T_x [N], and poses held in a stable equilibrium [%]",
+        [*head, "held, susp.", "mixed"],
+        rows,
+    )
     return finding(
         "five-models",
         numbers={
@@ -319,13 +315,7 @@ def _models(study: PathStudy) -> Finding:
             "longest_length_m": max(figures(run).length_max for run in study.of(sl.Catenary)),
         },
         panels=panels,
-        data=(
-            Table(
-                "Distance from the plan [mm], highest T_x [N], and poses held in a stable equilibrium [%]",
-                [*head, "held, susp.", "mixed"],
-                rows,
-            ),
-        ),
+        data=(shown,),
         exact=_worst(study.of(sl.Catenary)),
         parabolic=_worst(study.of(sl.Parabolic)),
     )

@@ -36,6 +36,14 @@ def _pair(name: str) -> Pair:
 
 def _volumes(pairs: dict[str, Pair]) -> Finding:
     change = {name: exact.volume / straight.volume - 1.0 for name, (exact, straight) in pairs.items()}
+    shown = table_of(
+        "Volumes of the workspaces within the frame.",
+        ("robot", pairs, ""),
+        ("with sag [m³]", [exact.volume for exact, _ in pairs.values()], ".1f"),
+        ("error [m³]", [exact.volume_error for exact, _ in pairs.values()], ".1f"),
+        ("straight [m³]", [straight.volume for _, straight in pairs.values()], ".1f"),
+        ("change [%]", [100.0 * each for each in change.values()], "+.2f"),
+    )
     return finding(
         "volume",
         numbers={
@@ -48,16 +56,7 @@ def _volumes(pairs: dict[str, Pair]) -> Finding:
             }
             for name, (exact, straight) in pairs.items()
         },
-        data=(
-            table_of(
-                "Volumes of the workspaces within the frame.",
-                ("robot", pairs, ""),
-                ("with sag [m³]", [exact.volume for exact, _ in pairs.values()], ".1f"),
-                ("error [m³]", [exact.volume_error for exact, _ in pairs.values()], ".1f"),
-                ("straight [m³]", [straight.volume for _, straight in pairs.values()], ".1f"),
-                ("change [%]", [100.0 * each for each in change.values()], "+.2f"),
-            ),
-        ),
+        data=(shown,),
     )
 
 

@@ -33,19 +33,14 @@ READ: Final = ("lengths", "counts")  # quantity that the winches report; the ind
 UNITS = ("m", "kg/m", "N", "kg", "rad", "s", "1")
 P: Final = ("parameter",)
 N: Final = ("pose",)
+TURN: Final = ("quaternion_part",)
+PLACE: Final = "index of each parameter by kind and cable, -1 for none"
 PARAMETERS: Final = (
     Quantity("parameter_name", P, "", "kind of each parameter", "names", values=str),
     Quantity("parameter_label", P, "", "name of each parameter", "labels", values=str),
     Quantity("parameter_unit", P, "", "unit of each parameter, 1 for none", "units", values=str),
     Quantity("parameter_cable", P, "", "cable of each parameter, -1 for all cables", "cables", values=int),
-    Quantity(
-        "parameter_place",
-        ("kind_row", "cable"),
-        "",
-        "index of each parameter by kind and cable, -1 for none",
-        "where",
-        values=int,
-    ),
+    Quantity("parameter_place", ("kind_row", "cable"), "", PLACE, "where", values=int),
     Quantity("prior", P, "", "prior values, in the units of the parameters"),
     Quantity("prior_deviation", P, "", "standard deviations of the prior values", infinite=True),
     Quantity("prior_stated", P, "", "source of the prior: tolerances or caller", "stated", values=bool),
@@ -79,9 +74,7 @@ SENSORS: Final = {  # name in the file: attribute and unit; a value is one numbe
 }
 PLACED: Final = (
     Quantity("measuring_position", ("axis",), "m", "position of the measuring system", "frame.position"),
-    Quantity(
-        "measuring_quaternion", ("quaternion_part",), "1", "rotation from measuring system to world", "frame.quaternion"
-    ),
+    Quantity("measuring_quaternion", TURN, "1", "rotation from measuring system to world", "frame.quaternion"),
     Quantity("target", ("axis",), "m", "measured point of the platform"),
 )
 LEFT_OUT: Final = (

@@ -29,34 +29,27 @@ if TYPE_CHECKING:
 CABLE, AXIS, WRENCH, TWIST = ("cable",), ("axis",), ("wrench_part",), ("twist_part",)
 CABLES, CONTACT = "state.cables.", "state.contact."  # results for the free cables, and for the cables on their pulleys
 CHANGE: Final = "change of the force that makes the pose feasible"
+UNBALANCED: Final = "norms of unbalanced force and moment in the free motions"
+EXTERNAL: Final = "external and inertial wrench about the center of mass in world axes, without gravity"
+VERTICAL: Final = "vertical force T_z on the cable at the platform end, up positive"
+FREE: Final = "tension along the chord of the free cable, from its exit point"
+WOUND: Final = "direction of friction: 1 winding in, -1 paying out, 0 standing"
+LACKING: Final = "vector y that proves a pose infeasible: the cables supply too little force along y at any tensions"
+BRACKET: Final = f"proved lower bound and sufficient value of the smallest {CHANGE}"
+SEARCHED: Final = "true if the tensions come from the search at the border of feasibility, not from the tension method"
 QUANTITIES = (
     Quantity("unstrained_length", CABLE, "m", "unstrained length L off the drum", known=SOLVED, low=0.0),
     Quantity("chord_tension", CABLE, "N", "tension along the chord, T_x / cos phi", known=SOLVED, low=0.0),
     Quantity("horizontal_tension", CABLE, "N", "horizontal tension T_x", CABLES, SOLVED, 0.0),
-    Quantity(
-        "vertical_force", CABLE, "N", "vertical force T_z on the cable at the platform end, up positive", CABLES, SOLVED
-    ),
+    Quantity("vertical_force", CABLE, "N", VERTICAL, CABLES, SOLVED),
     Quantity("span", CABLE, "m", "horizontal distance from frame end to platform end", CABLES, low=0.0),
     Quantity("rise", CABLE, "m", "height of the platform end above the frame end", CABLES),
     Quantity("cable_status", CABLE, "", "status of each cable's calculation", f"{CABLES}status", codes=CableStatus),
     Quantity("pose_status", (), "", "status of each pose's calculation", "status", codes=PoseStatus),
     Quantity("shortfall", (), "N", f"smallest {CHANGE}", known=SOMEWHERE, low=0.0, infinite=True),
-    Quantity(
-        "wrench_residual",
-        ("residual_part",),
-        "N, N m",
-        "norms of unbalanced force and moment in the free motions",
-        known=SOLVED,
-        low=0.0,
-    ),
+    Quantity("wrench_residual", ("residual_part",), "N, N m", UNBALANCED, known=SOLVED, low=0.0),
     Quantity("blocking", CABLE, "", "true if the cable's limits oppose the needed wrench", values=bool),
-    Quantity(
-        "wrench",
-        WRENCH,
-        "N, N m",
-        "external and inertial wrench about the center of mass in world axes, without gravity",
-        "state.",
-    ),
+    Quantity("wrench", WRENCH, "N, N m", EXTERNAL, "state."),
     Quantity("position", AXIS, "m", "position of the platform origin in the world", "state.pose."),
     Quantity("quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last", "state.pose."),
 )
@@ -64,15 +57,7 @@ QUANTITIES = (
 # variables of a plan with pulleys or drums
 MACHINE = (
     Quantity("free_length", CABLE, "m", "unstrained length of the free cable", known=SOLVED, low=0.0),
-    Quantity(
-        "free_chord_tension",
-        CABLE,
-        "N",
-        "tension along the chord of the free cable, from its exit point",
-        f"{CABLES}chord_tension",
-        SOLVED,
-        0.0,
-    ),
+    Quantity("free_chord_tension", CABLE, "N", FREE, f"{CABLES}chord_tension", SOLVED, 0.0),
     Quantity("wrap_angle", CABLE, "rad", "angle over which the cable lies on its pulley", known=SOLVED, low=0.0),
     Quantity("wrapped_length", CABLE, "m", "unstrained length on the pulley", CONTACT, SOLVED, 0.0),
     Quantity("dead_length", CABLE, "m", "unstrained length between pulley and drum", CONTACT, SOLVED, 0.0),
@@ -80,40 +65,18 @@ MACHINE = (
 )
 
 # variable of a plan with friction
-WINDING = Quantity(
-    "winding", CABLE, "1", "direction of friction: 1 winding in, -1 paying out, 0 standing", CONTACT, low=-1.0
-)
+WINDING = Quantity("winding", CABLE, "1", WOUND, CONTACT, low=-1.0)
 
 # variable of a plan with a swivel axis that is not vertical
 AZIMUTH = Quantity("azimuth", CABLE, "rad", "azimuth of the vertical plane of the free cable", CONTACT, SOLVED)
 
 # proofs of infeasibility; older files do not have them
 PROOF = (
-    Quantity(
-        "farkas",
-        WRENCH,
-        "1, 1/m",
-        "vector y that proves a pose infeasible: the cables supply too little force along y at any tensions",
-        known=SOMEWHERE,
-    ),
+    Quantity("farkas", WRENCH, "1, 1/m", LACKING, known=SOMEWHERE),
     Quantity("needed", WRENCH, "N, N m", "wrench J tau that the chord tensions must supply", known=SOMEWHERE),
-    Quantity(
-        "bracket",
-        ("bracket_part",),
-        "N",
-        f"proved lower bound and sufficient value of the smallest {CHANGE}",
-        known=SOMEWHERE,
-        low=0.0,
-        infinite=True,
-    ),
+    Quantity("bracket", ("bracket_part",), "N", BRACKET, known=SOMEWHERE, low=0.0, infinite=True),
     Quantity("relief", AXIS, "N", "smallest additional force that makes the pose feasible", known=SOMEWHERE),
-    Quantity(
-        "at_border",
-        (),
-        "",
-        "true if the tensions come from the search at the border of feasibility, not from the tension method",
-        values=bool,
-    ),
+    Quantity("at_border", (), "", SEARCHED, values=bool),
 )
 
 # variable of a plan along a path

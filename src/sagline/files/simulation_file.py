@@ -25,13 +25,12 @@ from sagline.robot.pose import Pose
 if TYPE_CHECKING:
     from xarray import Dataset
 
+TURN: Final = ("quaternion_part",)
 TIME: Final = Quantity("time", (), "s", "time")
 # variables of every sample; a broken cable has no length, and no nodes between its pieces
 SAMPLES: Final = (
     Quantity("position", ("axis",), "m", "position of the platform origin in the world", "pose.position"),
-    Quantity(
-        "quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last", "pose.quaternion"
-    ),
+    Quantity("quaternion", TURN, "1", "rotation from platform to world, scalar last", "pose.quaternion"),
     Quantity("twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity"),
     Quantity("tensions", ("cable",), "N", "tension at the frame end", low=0.0),
     Quantity("length", ("cable",), "m", "unstrained length off the drum; none once broken", known=SOMEWHERE, low=0.0),
@@ -45,9 +44,8 @@ SAMPLES: Final = (
 # one value per cable, in files that contain it
 LARGEST: Final = Quantity("largest_tension", ("cable",), "N", "largest tension at the frame end at any step", low=0.0)
 # variables of cables with mass
-NODES: Final = Quantity(
-    "node_position", ("cable", "node", "axis"), "m", "position of the cables at their nodes", "nodes", SOMEWHERE
-)
+NODE: Final = ("cable", "node", "axis")
+NODES: Final = Quantity("node_position", NODE, "m", "position of the cables at their nodes", "nodes", SOMEWHERE)
 # variables of each event, which are the attributes of `Occurrence`
 EVENT: Final = ("event",)
 INDEX: Final = "index of the cable or winch, from 0; -1 for the platform"

@@ -128,15 +128,10 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
     return found
 
 
+PATHS: Final = "positions of moving frame anchors in the world; cubic splines between the samples"
 ANCHORS: Final = (
     Quantity("anchor_time", ("anchor_sample",), "s", "time of the samples of moving frame anchors", "anchors.time"),
-    Quantity(
-        "anchor_position",
-        ("anchor_sample", "cable", "axis"),
-        "m",
-        "positions of moving frame anchors in the world; cubic splines between the samples",
-        "anchors.position",
-    ),
+    Quantity("anchor_position", ("anchor_sample", "cable", "axis"), "m", PATHS, "anchors.position"),
 )
 
 

@@ -42,6 +42,8 @@ NODES: Final = ("x", "y", "z")  # coordinates of the nodes of the grid
 FINE: Final = ("fine_x", "fine_y", "fine_z")  # coordinates of the finer grid on which components are separated
 
 ACCELERATION: Final = ("acceleration_part",)
+COMPONENT, WRENCH, ELLIPSOID = ("component",), ("wrench_part",), ("ellipsoid", "wrench_part", "column")
+SEPARATE: Final = "true if the component is proved to be separate"
 QUANTITIES: Final = (
     *(Quantity(name, (name,), "m", f"{name} of the nodes of the grid") for name in NODES),
     Quantity("level", NODES, "1", "least value of the criteria over their scales, >= 0 inside", infinite=True),
@@ -54,26 +56,11 @@ QUANTITIES: Final = (
     Quantity("vertex_component", ("vertex",), "", "component of each vertex", "components.vertices", values=int),
     *(Quantity(fine, (fine,), "m", f"{fine[-1]} of the finer nodes", f"components.{fine[-1]}") for fine in FINE),
     Quantity("component_nodes", FINE, "", "component of each finer node, -1 outside", "components.nodes", values=int),
-    Quantity(
-        "component_separate",
-        ("component",),
-        "",
-        "true if the component is proved to be separate",
-        "components.separate",
-        values=bool,
-    ),
+    Quantity("component_separate", COMPONENT, "", SEPARATE, "components.separate", values=bool),
     Quantity("rotation", ("turn", "quaternion_part"), "1", "rotations of the platform", "orientations.quaternion"),
     Quantity("wrench_center", ("wrench_part",), "N, N m", "center of the wrench set", "wrenches.center"),
-    Quantity(
-        "wrench_segment", ("segment", "wrench_part"), "N, N m", "half vector of each segment", "wrenches.segments"
-    ),
-    Quantity(
-        "wrench_ellipsoid",
-        ("ellipsoid", "wrench_part", "column"),
-        "N, N m",
-        "semi-axes of each ellipsoid",
-        "wrenches.ellipsoids",
-    ),
+    Quantity("wrench_segment", ("segment", *WRENCH), "N, N m", "half vector of each segment", "wrenches.segments"),
+    Quantity("wrench_ellipsoid", ELLIPSOID, "N, N m", "semi-axes of each ellipsoid", "wrenches.ellipsoids"),
     Quantity("corner_wrench", ("polytope_corner", "wrench_part"), "N, N m", "corners of polytopes", "wrenches.corners"),
     Quantity("polytope_size", ("polytope",), "", "number of corners of each polytope", "wrenches.sizes", values=int),
     Quantity("largest_acceleration", ACCELERATION, "m/s2, rad/s2", "largest accelerations", "wrenches.accelerations"),
