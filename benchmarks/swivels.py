@@ -28,8 +28,8 @@ TARGETS = {
     "forward, steps of 2 mm": "≤ 1.5 x vertical",
     "forward, start pose wrong by 35 mm": "≤ 1.5 x vertical",
     "forward, no start pose": "≤ 1.5 x vertical",
-    "inverse": "≤ 2.5 x vertical",
-    "inverse without stability": "≤ 2.5 x vertical",
+    "inverse": "≤ 1.5 x vertical",
+    "inverse without stability": "≤ 1.5 x vertical",
     "stiffness and sensitivities": "≤ 1.5 x vertical",
     "calibration of 100 poses with lengths and load cells": "≤ 1.5 x vertical",
 }

@@ -94,7 +94,7 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
         "": (*INVERSE, NONE, BOOL, ANSWERS, INT, INT),
         "methods": (*INVERSE, BOOL, BOOL, ANSWERS, INT, INT),
     },
-    "inverse_poses_of_slanted": {"": (*INVERSE[:4], F3, *INVERSE[4:], ANSWERS, INT, INT)},
+    "inverse_poses_of_slanted": {"": (*INVERSE[:4], F3, *INVERSE[4:], BOOL, ANSWERS, INT, INT)},
     "least_distances": {"": (F3, F2, I2, FLOAT, BOOL, F2, F2, F2, F2, F4)},
     "least_stiffnesses": {"": (F2, F3, MEMORY, F1)},
     "lengths_at_frame_ends": {"": (TERMS, F2, F1, F1, F1, F1, F1, F2, F2)},

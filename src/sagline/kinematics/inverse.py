@@ -130,25 +130,25 @@ def inverse(
     loads = np.atleast_2d(load)
     slanted = has_slanted_axes(robots)
     reference = None if options is None else _reference(shared, previous, tension.variable)
-    proves = stability and not slanted
 
     def solve(
-        terms: RobotTerms, which: Indices | None = None, repeated: bool = False, swivels: Array | None = None
+        terms: RobotTerms, which: Indices | None = None, swivels: Array | None = None, first: bool = True
     ) -> tuple[InverseRows, Array]:
         """Results of the poses `which` for the robot arrays `terms`, and rows of the found poses."""
-        at, report = slice(None) if which is None else which, None if repeated else progress
+        at, report = slice(None) if which is None else which, progress if first else None
         some, acting = locked(rows[at]), locked(loads[at] if len(loads) > 1 else loads)
         if options is None or reference is None:
-            asked = values, number(level, "level", "N"), path is not None, proves, report
+            asked = values, number(level, "level", "N"), path is not None, stability, report
             return inverse_rows.solve_underconstrained_rows(robots, model, some, acting, *asked, terms)
         found = inverse_rows.solve_inverse_rows(
-            robots, method, options, some, acting, reference.copy(), proves, report, terms, swivels
+            robots, method, options, some, acting, reference.copy(), stability, report, terms, swivels
         )
         inverse_rows.decide_rows(terms, options, some, acting, found, report)
         return found, some
 
     if slanted:
-        found, rows = solve_slanted_axes(placed, model, pose, solve, stability)
+        chained = options is None or options.sharing[0] == codes.CLOSEST
+        found, rows = solve_slanted_axes(placed, model, pose, solve, chained)
     else:
         found, rows = solve(robot_terms(robots, anchors=places))
     if options is None:

@@ -137,7 +137,7 @@ def solve_inverse_rows(
                 *options, terms, rows, loads, last, memory, otherwise, stability, found.answers, part.start, part.stop
             )
         else:
-            of_slanted = (*options, terms, swivels, rows, loads, last, memory, found.answers)
+            of_slanted = (*options, terms, swivels, rows, loads, last, memory, stability, found.answers)
             inverse_poses_of_slanted(*of_slanted, part.start, part.stop)
         if progress is not None:
             done += int(np.count_nonzero(~np.isin(found.pose_status[part], UNDECIDED)))

@@ -1,9 +1,9 @@
 """Inverse kinematics of robots whose pulleys swivel about axes of any direction; docs/model.md, section 10.
 
-The cables are solved as cables that start at eyelets at their exit points. The tensions found determine new exit
-points, at which the next pass starts. The kernel repeats the passes of poses with tensions; a pass leaves about
-(R/D)(wL/T)^2 of the error. Poses without tensions within their limits are first solved with wider limits, because exit
-points of straight cables can make a pose near its limits infeasible.
+The kernel moves the exit points of the cables together with the tensions. Poses without tensions within their limits
+are solved again with wider limits, because exit points of straight cables can make a pose near its limits infeasible.
+Platforms on fewer cables than degrees of freedom are solved as cables from eyelets at their exit points. The tensions
+found determine new exit points, at which the next pass starts. A pass leaves about (R/D)(wL/T)^2 of the error.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing
 if TYPE_CHECKING:
     from sagline.kernels.inverse.poses import Robots as RobotTerms
 
-    # robot arrays, poses, True for a repeated pass, without reports of its progress, and cable_table with swivel axes
-    Solve = Callable[[RobotTerms, Indices, bool, Array], tuple[InverseRows, Array]]
+    # robot arrays, poses, cable_table with swivel axes, and True for the first pass, which reports its progress
+    Solve = Callable[[RobotTerms, Indices, Array, bool], tuple[InverseRows, Array]]
 
-PASSES: Final = 30  # of the inverse kinematics; three or four are usual
+PASSES: Final = 30  # three or four are usual
 SAME: Final = 1e-13  # change of an exit point at convergence, relative to the free span
 CLOSE: Final = 1e-12  # largest accepted change after the last pass
 WIDEST, NARROWEST = 0.9, 1e-9  # widening of limits, share of the limits
@@ -54,53 +54,83 @@ class _Pass(NamedTuple):
 
 
 def solve_slanted_axes(
-    robot: Robots, model: CableModel, pose: Pose, solve: Solve, stability: bool
+    robot: Robots, model: CableModel, pose: Pose, solve: Solve, chained: bool
 ) -> tuple[InverseRows, Array]:
-    """Results of the inverse kinematics, and rows of the found poses. `solve`: solver for cables without pulleys."""
+    """Results of the inverse kinematics, and rows of the found poses. `solve`: solver for cables from eyelets."""
+    # chained: True if the result of a pose depends on the results of the poses before
     check_slanted(robot, model)
-    geometry = chord_geometry(robot, pose, slanted=True)
-    refuse_missing_chords(robot, pose, geometry)
     freedom, bodies, table = robot_terms(robot, slanted=True)
     bare = table[..., : tables.CABLE_COLUMNS].copy()  # cables from eyelets
     bare[..., tables.PULLEY_RADIUS :] = 0.0
     bare[..., tables.ENTRY] = 1.0
-    ends = _ends(table, pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3))
-    moves = is_underconstrained(first_of(robot))
+    everywhere = np.arange(len(np.atleast_2d(pose.position)))
 
-    def run(exits: Array, which: Indices, wider: ArrayLike, repeated: bool = True) -> _Pass:
-        """One pass for the poses `which`, at limits that are wider by the share `wider` of their values."""
+    def eyelets_of(which: Indices) -> tuple[Array, Array, Array]:
+        """Own copies of the rows of `bare`, and the rows of `table` and `bodies`, for the poses `which`."""
         own, body, eyelet = (each[which] if len(each) > 1 else each for each in (table, bodies, bare))
-        eyelets = np.empty((*exits.shape[:2], tables.CABLE_COLUMNS))
+        eyelets = np.empty((len(which), *bare.shape[1:]))
         eyelets[:] = eyelet
+        return eyelets, own, body
+
+    def run(exits: Array, which: Indices, wider: ArrayLike) -> _Pass:
+        """One pass for the poses `which`, at limits that are wider by the share `wider` of their values."""
+        eyelets, own, body = eyelets_of(which)
         eyelets[..., : tables.PLATFORM_X] = exits
         if np.any(wider):
             eyelets[..., tables.TENSION_MIN] *= 1.0 - np.reshape(wider, (-1, 1))
             eyelets[..., tables.TENSION_MAX] *= 1.0 + np.reshape(wider, (-1, 1))
-        found, rows = solve((freedom, locked(body), eyelets), which, repeated, locked(own))
-        end = ends[which]
-        if moves:
-            reached = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
-            end = _ends(own, reached.position, reached.matrix)
+        found, rows = solve((freedom, locked(body), eyelets), which, locked(own), False)
+        reached = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
         exits = np.ascontiguousarray(eyelets[..., : tables.PLATFORM_X])
-        chord = end - exits
+        chord = _ends(own, reached.position, reached.matrix) - exits
         size = _norm(chord)
         numbers = _next_exits(robots_at(robot, which), model, own, body, exits, chord, size, found.results)
         return _Pass(found, rows, chord, numbers, np.nan_to_num(_norm(numbers[..., :3] - exits) / size))
 
-    exits = ends - _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
-    everywhere = np.arange(len(exits))
+    if is_underconstrained(first_of(robot)):
+        found, rows = _pass_by_pass(run, _tangent_exits(robot, pose, table), everywhere)
+    else:
+        eyelets = eyelets_of(everywhere)[0]
+        eyelets[..., tables.FRAME_X] = np.nan
+        found, rows = solve((freedom, bodies, eyelets), everywhere, table, True)
+        lost = ~np.isin(found.pose_status, SOLVED) | found.at_border
+        if lost.any():
+            which = everywhere if chained else np.flatnonzero(lost)
+            exits = np.where(lost[:, None, None], _tangent_exits(robot, pose, table), np.nan)
+            repeated = _pass_by_pass(run, exits[which], which)[0]
+            found.results[:, which] = repeated.results
+            for whole, part in zip(found[1:], repeated[1:], strict=True):
+                whole[which] = part
+    found.results[tables.LENGTH] += found.results[tables.WRAPPED] + found.results[tables.DEAD]
+    return found, rows
+
+
+def _tangent_exits(robot: Robots, pose: Pose, table: Array) -> Array:
+    """Exit points (N, m, 3) [m] of straight cables."""
+    geometry = chord_geometry(robot, pose, slanted=True)
+    refuse_missing_chords(robot, pose, geometry)
+    ends = _ends(table, pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3))
+    return ends - _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
+
+
+def _pass_by_pass(
+    run: Callable[[Array, Indices, ArrayLike], _Pass], exits: Array, which: Indices
+) -> tuple[InverseRows, Array]:
+    """Results of the poses `which` from passes that start at the exit points `exits`, and rows of the found poses."""
+    # Every pass of poses whose exit points are NaN starts at those of straight cables.
+    moves = np.isfinite(exits[:, :, :1])
     near, unsure = np.zeros((2, len(exits)), dtype=np.bool_)  # poses whose limits were widened; without a sure verdict
-    for count in range(PASSES):
-        last = run(exits, everywhere, 0.0, repeated=count > 0)
+    for _ in range(PASSES):
+        last = run(exits, which, 0.0)
         short = np.isin(last.found.pose_status, SHORT)
         fresh = short & ~near
         if not fresh.any() and not (last.change > SAME).any():
             break
         known = np.isfinite(last.numbers[..., :1])
-        exits = np.where(known, last.numbers[..., :3], exits)
+        exits = np.where(known & moves, last.numbers[..., :3], exits)
         unsure |= last.solved & near  # its verdict has changed if it is infeasible at the end
         if fresh.any():
-            unsure[_approach_limits(run, exits, np.flatnonzero(fresh))] = True
+            unsure[_approach_limits(run, exits, which, np.flatnonzero(fresh))] = True
             near |= fresh
     found, solved = last.found, last.solved
     lost = (solved & (last.change > CLOSE).any(axis=-1)) | (short & (unsure | fresh))
@@ -108,18 +138,18 @@ def solve_slanted_axes(
     found.brackets[lost] = np.nan
     _write(found.results, last.chord, last.numbers)
     found.results[tables.SINE :, ~solved] = np.nan
-    if stability:
-        found.pose_status[solved & ~lost & ~found.at_border] = codes.UNPROVED_STABILITY
     return found, last.rows
 
 
-def _approach_limits(run: Callable[[Array, Indices, Array], _Pass], exits: Array, which: Indices) -> Indices:
-    """Move the exit points of the infeasible poses `which` to those at tensions close to the limits."""
+def _approach_limits(
+    run: Callable[[Array, Indices, Array], _Pass], exits: Array, poses: Indices, which: Indices
+) -> Indices:
+    """Move the exit points of the infeasible poses `poses[which]` to those at tensions close to the limits."""
     # The limits are widened less and less. A pose stays infeasible if the last change of its exit points is smaller
     # than the widening of the limits that does not make it feasible. Returns the poses at which this remains unknown.
     wider, moved, unsure = np.full(len(which), WIDEST), np.zeros(len(which)), []
     for _ in range(PASSES):
-        last = run(exits[which], which, wider)
+        last = run(exits[which], poses[which], wider)
         solved = last.solved
         new, at = last.numbers[solved, :, :3], which[solved]
         moved[solved] = (_norm(new - exits[at]) / _norm(last.chord[solved])).max(axis=-1)
@@ -177,8 +207,7 @@ def _next_exits(
 
 
 def _write(results: Array, chord: Array, numbers: Array) -> None:
-    """Write exit points and lengths off the drum to the results of cables without pulleys."""
+    """Write exit points to the results of cables from eyelets."""
     results[tables.WRAP], results[tables.WRAPPED], results[tables.DEAD] = np.moveaxis(numbers[..., 3:], -1, 0)
-    results[tables.LENGTH] += results[tables.WRAPPED] + results[tables.DEAD]
     results[tables.SINE] = chord[..., 2] / _norm(chord)
     results[tables.AZIMUTH] = np.arctan2(chord[..., 1], chord[..., 0])

@@ -81,7 +81,7 @@ def decide_poses(
         if status != codes.POSE_SOLVED and status != codes.POSE_INFEASIBLE and status != codes.POSE_BORDERLINE:
             brackets[p, tables.PROVED] = brackets[p, tables.ENOUGH] = math.nan
         if status == codes.POSE_SOLVED:
-            inverse.measure_balance(platform, cables, balance, residuals[p])
+            inverse.measure_balance(None, platform, cables, balance, residuals[p])
             inverse.write_solution(True, model, cables, balance, results, p)
         else:
             statuses[p] = codes.CABLE_SOLVED

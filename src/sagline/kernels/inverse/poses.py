@@ -17,6 +17,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import states
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Cables, Model, chord_of, material_of, new_cables, pulley_of
+from sagline.kernels.inverse.exits import SAME_EXIT, Exits, fill_needed_wrench, move_exits
 from sagline.kernels.inverse.stability import new_stability_arrays, proves_stability
 from sagline.kernels.jit import entry, glue, kernel
 from sagline.kernels.memory import Memory
@@ -53,17 +54,19 @@ SAG_ROUNDING = 1e-15
 @glue
 def distribute_and_solve_cables(
     model: Model, distribution: nearest.Distribution, platform: statics.Platform, cables: Cables,
-    balance: statics.Balance, near: nearest.ReferencePoint, work: WorkArrays | None, statuses: Codes,
+    balance: statics.Balance, near: nearest.ReferencePoint, work: WorkArrays | None, exits: Exits | None,
+    statuses: Codes,
 ) -> int:  # fmt: skip
     """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status."""
     # `cables`: the cables from `set_pose`, with tensions, ratios and sag forces to be filled. `work`: work arrays for
-    # frame-end tensions and for methods that are not projections; if None, this code is not compiled. `statuses`:
-    # filled with the status of each cable, (m,).
+    # frame-end tensions and for methods that are not projections; if None, this code is not compiled. `exits`: pulleys
+    # with swivel axes of any direction; the cables start at eyelets at their exit points. `statuses`: filled with the
+    # status of each cable, (m,).
     near.held.labels[0] = 0
     if work is not None:
         reset_work_arrays(work)
     nearest.set_reference(distribution, balance.offset, balance.null, near)
-    solved = False
+    solved, away = False, 0.0
     statics.fill_needed_wrench(platform, cables, balance)
     possible = states.cable_without_tension(cables) < 0
     status = codes.POSE_NOT_CONVERGED if possible else codes.POSE_INFEASIBLE
@@ -82,7 +85,11 @@ def distribute_and_solve_cables(
         if status != codes.POSE_SOLVED:
             break
         moved, largest = take_tensions(cables, balance)
-        gravest, turned = states.solve_cable_states(model, cables, not solved, solved and moved < states.NEAR, statuses)
+        if exits is not None:
+            away = move_exits(model, exits, platform, cables, balance, not solved)
+        gravest, turned = states.solve_cable_states(
+            model, cables, not solved, solved and moved + away < states.NEAR, statuses
+        )
         if gravest == codes.CABLE_TOO_SLACK or gravest == codes.CABLE_NOT_CONVERGED:
             status = codes.POSE_NOT_CONVERGED
             break
@@ -91,6 +98,8 @@ def distribute_and_solve_cables(
         converged = model.code != codes.CATENARY or (
             change <= CONVERGED + SAG_ROUNDING * largest and turned <= states.SAME_EXIT
         )
+        if exits is not None:
+            converged = converged and away <= SAME_EXIT
         if work is None or distribution.variable != codes.FRAME_END_TENSION:
             if converged:
                 status = codes.POSE_SOLVED
@@ -105,7 +114,7 @@ def distribute_and_solve_cables(
             nearest.set_reference(distribution, balance.offset, balance.null, near)
             reset_work_arrays(work)
         solved = True
-        statics.fill_needed_wrench(platform, cables, balance)
+        fill_needed_wrench(exits, platform, cables, balance)
     if status == codes.POSE_SOLVED and not _strain_admits_tensions(cables):
         status = codes.POSE_INFEASIBLE
     return status
@@ -254,10 +263,10 @@ def inverse_poses(
         status = statics.set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
         if status == codes.POSE_SOLVED:
             status = distribute_and_solve_cables(
-                model, distribution, platform, cables, balance, near, others, statuses[p]
+                model, distribution, platform, cables, balance, near, others, None, statuses[p]
             )
         if status == codes.POSE_SOLVED:
-            measure_balance(platform, cables, balance, residuals[p])
+            measure_balance(None, platform, cables, balance, residuals[p])
             if distribution.method == codes.CLOSEST:
                 store_tensions(model, distribution, cables, others, near)
         else:
@@ -268,15 +277,17 @@ def inverse_poses(
         pose_statuses[p] = status
         if stability is not None and proof is not None:
             asked = stability and status == codes.POSE_SOLVED
-            if asked and not proves_stability(model, platform, cables, balance, proof):
+            if asked and not proves_stability(model, None, platform, cables, balance, proof):
                 pose_statuses[p] = codes.UNPROVED_STABILITY
         write_solution(status == codes.POSE_SOLVED, model, cables, balance, results, p)
 
 
 @glue
-def measure_balance(platform: statics.Platform, cables: Cables, balance: statics.Balance, residuals: Array) -> None:
+def measure_balance(
+    exits: Exits | None, platform: statics.Platform, cables: Cables, balance: statics.Balance, residuals: Array
+) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the platform's free motions."""
-    statics.fill_needed_wrench(platform, cables, balance)
+    fill_needed_wrench(exits, platform, cables, balance)
     rest = balance.needed  # `needed` serves as work memory here, because `balance.right` still contains its components
     for k in range(balance.right.size):
         rest[k] = -balance.right[k]

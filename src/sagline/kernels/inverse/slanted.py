@@ -1,6 +1,6 @@
 """Inverse kinematics of a batch of poses with swivel axes of any direction; docs/model.md, section 10.10.
 
-Each cable is solved as a cable from an eyelet at its exit point. The tensions found determine the next exit points.
+Each cable is solved as a cable from an eyelet at its exit point, which moves with the tensions.
 """
 
 from __future__ import annotations
@@ -9,36 +9,15 @@ import math
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes, statics, tables
-from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.states import TensionLimits
-from sagline.kernels.cable.swivel import next_exit, swivel_at
-from sagline.kernels.cable.terms import Cables, Model, new_cables
+from sagline.kernels.cable.terms import new_cables
 from sagline.kernels.inverse import poses as inverse
-from sagline.kernels.jit import entry, glue
-from sagline.kernels.memory import Memory
+from sagline.kernels.inverse.exits import Exits, start_at_tangents, write_behind
+from sagline.kernels.inverse.stability import new_stability_arrays, proves_stability
+from sagline.kernels.jit import entry
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.tension import nearest
 from sagline.kernels.tension.polygon import new_work_arrays
-
-PASSES = 8  # largest number of passes; three are usual
-SAME_EXIT = 2e-12  # change of an exit point after which the next change is a rounding error, relative to the free span
-
-
-@glue
-def _move_exits(model: Model, robot: Array, cables: Cables, geometry: Array, eyelets: Array) -> float:
-    """Move the frame anchors of `eyelets` to the exit points of the present forces. Returns the largest change."""
-    # The change is relative to the free span. `robot`: rows of a cable_table with swivel axes.
-    gravity = model.gravity if model.code == codes.CATENARY else 0.0
-    change = 0.0
-    for i in range(cables.tau.size):
-        swivel = swivel_at(robot, i, gravity)
-        chord, level = cables.chord[i], cables.tau[i] * cables.cosine[i]
-        x, y = level * geometry[g.AZIMUTH_X, i], level * geometry[g.AZIMUTH_Y, i]
-        z = cables.tau[i] * cables.sine[i] + cables.sag_force[i] - swivel.weight * cables.ratio[i] * chord
-        (x, y, z), _at = next_exit(swivel, robot, i, (x, y, z), eyelets, chord)
-        away = abs(x - eyelets[i, 0]) + abs(y - eyelets[i, 1]) + abs(z - eyelets[i, 2])
-        change = max(change, away / chord)
-        eyelets[i, tables.FRAME_X], eyelets[i, tables.FRAME_Y], eyelets[i, tables.FRAME_Z] = x, y, z
-    return change
 
 
 @entry
@@ -52,6 +31,7 @@ def inverse_poses_of_slanted(
     wrenches: Array,
     previous: Array,
     memory: tuple[Array, Indices],
+    stability: bool,
     answers: inverse.Answers,
     first: int,
     last: int,
@@ -59,8 +39,9 @@ def inverse_poses_of_slanted(
     """Solve part of a batch with swivel axes of any direction, pose by pose."""
     # The arguments are the same as in `inverse_poses`, and:
     # `robot_terms`: with the cable_table of the cables from eyelets, (N, m, CABLE_COLUMNS). Its frame anchors are the
-    # initial exit points, and are replaced by the exit points found. `swivels`: cable_table with swivel axes, (1 or N,
-    # m, SWIVEL_COLUMNS).
+    # initial exit points, NaN for those of straight cables, and are replaced by the exit points found. `swivels`:
+    # cable_table with swivel axes, (1 or N, m, SWIVEL_COLUMNS). `stability`: True to prove the stability of each
+    # equilibrium. The lengths in `answers` are those of the free spans.
     distribution = nearest.Distribution(*distribution_terms)
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, _eyelets = robot_terms
@@ -69,27 +50,23 @@ def inverse_poses_of_slanted(
     cables, rest = new_cables(Memory(*memory), m, False)
     balance, rest = statics.new_balance(rest, m, n)
     near, rest = nearest.new_reference_point(rest, previous, m - n)
+    work, rest = block(rest, 4, m)
+    proof, rest = new_stability_arrays(rest, m, n - statics.translation_count(freedom))
     others = new_work_arrays(distribution.method, rest, m, m - n)
     for p in range(first, last):
         platform = inverse.platform_at(robot_terms, poses, wrenches, p)
         model = inverse.model_at(model_terms, platform.body)
-        robot = swivels[min(p, swivels.shape[0] - 1)]
-        status = codes.POSE_NOT_CONVERGED
-        for _ in range(PASSES):
-            statuses[p] = codes.CABLE_SOLVED
-            status = statics.set_pose(
-                model, limits, distribution.variable, distribution.weight, platform, cables, balance
-            )
-            if status == codes.POSE_SOLVED:
-                status = inverse.distribute_and_solve_cables(
-                    model, distribution, platform, cables, balance, near, others, statuses[p]
-                )
-            if status != codes.POSE_SOLVED:
-                break
-            if _move_exits(model, robot, cables, balance.geometry, platform.robot) <= SAME_EXIT:
-                break
+        exits = Exits(swivels[min(p, swivels.shape[0] - 1)], limits, work)
+        statuses[p] = codes.CABLE_SOLVED
+        if math.isnan(platform.robot[0, tables.FRAME_X]):
+            start_at_tangents(exits, platform, balance)
+        status = statics.set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
         if status == codes.POSE_SOLVED:
-            inverse.measure_balance(platform, cables, balance, residuals[p])
+            status = inverse.distribute_and_solve_cables(
+                model, distribution, platform, cables, balance, near, others, exits, statuses[p]
+            )
+        if status == codes.POSE_SOLVED:
+            inverse.measure_balance(exits, platform, cables, balance, residuals[p])
             if distribution.method == codes.CLOSEST:
                 inverse.store_tensions(model, distribution, cables, others, near)
         else:
@@ -98,4 +75,10 @@ def inverse_poses_of_slanted(
             supplied = status != codes.POSE_NO_CHORD and status != codes.POSE_SINGULAR
             needed[p, k] = balance.right[k] if supplied else math.nan
         pose_statuses[p] = status
+        asked = stability and status == codes.POSE_SOLVED
+        if asked and not proves_stability(model, exits, platform, cables, balance, proof):
+            pose_statuses[p] = codes.UNPROVED_STABILITY
         inverse.write_solution(status == codes.POSE_SOLVED, model, cables, balance, results, p)
+        results[tables.WRAP :, p] = math.nan
+        if status == codes.POSE_SOLVED:
+            write_behind(model, exits, platform, cables, balance, results, p)

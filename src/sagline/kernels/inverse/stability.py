@@ -19,11 +19,15 @@ from sagline.kernels.algebra.functions import EXCESS_LIMIT, atanhc_excess_polyno
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.models import sag_of_shallow
 from sagline.kernels.cable.pulley import Wrap, softness
+from sagline.kernels.cable.swivel import next_exit, swivel_at
 from sagline.kernels.cable.terms import Cables, Model, pulley_of
-from sagline.kernels.jit import glue, independent
+from sagline.kernels.inverse.exits import Exits
+from sagline.kernels.jit import formula, glue, independent
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import Balance, Platform
 
+WEIGHT_ON_PULLEY = 0.1  # wR/T above which no proof is attempted for slanted swivel axes
+MORE = 1.1  # factor of the compliance behind exit points, for slanted swivel axes
 ROUNDING = 0.01  # a proof with a smaller margin is rejected, because of rounding errors
 
 
@@ -49,8 +53,11 @@ def new_stability_arrays(memory: Memory, m: int, k: int) -> tuple[StabilityArray
 
 
 @glue
-def proves_stability(model: Model, platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays) -> bool:
+def proves_stability(
+    model: Model, exits: Exits | None, platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays
+) -> bool:
     """True if the equilibrium of a solved pose is proved stable, or its cables are straight, without a stiffness."""
+    # `exits`: pulleys with swivel axes of any direction, if `cables` are those from eyelets
     k = work.geometric.shape[0]
     if model.code == codes.STRAIGHT or k == 0:
         return True
@@ -62,7 +69,10 @@ def proves_stability(model: Model, platform: Platform, cables: Cables, balance: 
             if i != j:
                 low -= abs(work.geometric[j, i])
         least = min(least, low)
-    _fill_compliances(model, cables, work)
+    if exits is None:
+        _fill_compliances(model, cables, work)
+    else:
+        _fill_compliances_of_slanted(model, exits, platform, cables, balance, work.compliance)
     first = balance.inverse.shape[0] - k
     trace = 0.0
     for i in range(cables.tau.size):
@@ -109,6 +119,24 @@ def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balan
             work.geometric[j, i] = total
 
 
+@formula
+def _bending(weight: float, x: float, z: float, cosine: float, sine: float) -> tuple[float, float, float]:
+    """1/(T_A + T_B) [1/N], the part of the compliance along a direction that does not stretch the cable, and atanh."""
+    # The part is in units of the length times the first result. `weight`: wL [N]. `x`, `z`: force at the platform end.
+    # `cosine`, `sine`: horizontal and vertical component of the direction. The third result is atanh(u)/u - 1.
+    za = z - weight
+    at_end, at_frame = math.sqrt(x * x + z * z), math.sqrt(x * x + za * za)
+    turn = 1.0 / (at_end + at_frame)
+    inverse = 1.0 / (at_end * at_frame)
+    u = weight * turn
+    excess = atanhc_excess_polynomial(u * u) if u * u <= EXCESS_LIMIT else math.inf
+    # q c^2 + 2 c s r + p s^2 of `catenary_stiffness`, as a square without cancellation
+    level, mixed = (x * x - za * z) * inverse, x * (za + z) * inverse
+    larger = 1.0 + abs(level)
+    bend = mixed * cosine - larger * sine if level >= 0.0 else larger * cosine - mixed * sine
+    return turn, 2.0 * excess * cosine * cosine + bend * bend / larger, excess
+
+
 @glue
 def _fill_compliances(model: Model, cables: Cables, work: StabilityArrays) -> None:
     """Fill upper bounds of the compliances c of the platform ends along their chords, (m,) [m/N]."""
@@ -143,18 +171,7 @@ def _fill_exact_compliances(model: Model, cables: Cables, compliance: Array) -> 
         length = cables.ratio[i] * cables.free_chord[i]
         weight = cables.density[i] * model.gravity if model.code == codes.CATENARY else 0.0
         x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + cables.sag_force[i]
-        za = z - weight * length
-        at_end, at_frame = math.sqrt(x * x + z * z), math.sqrt(x * x + za * za)
-        turn = 1.0 / (at_end + at_frame)
-        inverse = 1.0 / (at_end * at_frame)
-        u = weight * length * turn
-        excess = atanhc_excess_polynomial(u * u) if u * u <= EXCESS_LIMIT else math.inf
-        # q c^2 + 2 c s r + p s^2 of `catenary_stiffness`, as a square without cancellation
-        level, mixed = (x * x - za * z) * inverse, x * (za + z) * inverse
-        larger = 1.0 + abs(level)
-        cosine, sine = cables.cosine[i], cables.sine[i]
-        bend = mixed * cosine - larger * sine if level >= 0.0 else larger * cosine - mixed * sine
-        bent = 2.0 * excess * cosine * cosine + bend * bend / larger
+        turn, bent, _excess = _bending(weight * length, x, z, cables.cosine[i], cables.sine[i])
         compliance[i] = length * (1.0 / cables.stiffness[i] + turn * bent)
 
 
@@ -180,6 +197,32 @@ def _fill_shallow_compliances(model: Model, cables: Cables, work: StabilityArray
         work.compliance[i] = 1.0 / along
         solvable = along > 0.0 and across > 0.0
         work.coupling[i] = 0.25 * (p + q) * (p + q) / across if solvable else math.inf
+
+
+@glue
+def _fill_compliances_of_slanted(
+    model: Model, exits: Exits, platform: Platform, cables: Cables, balance: Balance, compliance: Array
+) -> None:
+    """`_fill_compliances` along the first chords, for swivel axes of any direction."""
+    # Behind the exit point, the cable is as soft as without weight, and the pulley swings about its axis. The weight
+    # changes this by a share of about (wR/T)^2 + w(R psi + D)/EA; the bounds are larger by a tenth.
+    rows, gravity = balance.geometry, model.gravity if model.code == codes.CATENARY else 0.0
+    for i in independent(cables.tau.size):
+        swivel, length = swivel_at(exits.swivels, i, gravity), cables.ratio[i] * cables.chord[i]
+        cx, cy = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
+        ux, uy, uz = -balance.full[0, i], -balance.full[1, i], -balance.full[2, i]
+        x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + cables.sag_force[i]
+        level, across = ux * cx + uy * cy, uy * cx - ux * cy
+        turn, bent, excess = _bending(swivel.weight * length, x, z, level, uz)
+        bent += 2.0 * (1.0 + excess) * (across * across)
+        za = z - swivel.weight * length
+        _point, at = next_exit(swivel, exits.swivels, i, (x * cx, x * cy, za), platform.robot, cables.chord[i])
+        aside = ux * at.sx + uy * at.sy + uz * at.sz
+        swing = swivel.radius * at.sine / ((1.0 + at.cosine) * math.sqrt(x * x + za * za))
+        behind = (swivel.radius * at.wrap + swivel.dead) / cables.stiffness[i] + swing * aside * aside
+        light = swivel.weight * swivel.radius <= WEIGHT_ON_PULLEY * math.sqrt(x * x + za * za)
+        share = MORE if light else math.inf
+        compliance[i] = length * (1.0 / cables.stiffness[i] + turn * bent) + share * behind
 
 
 @glue

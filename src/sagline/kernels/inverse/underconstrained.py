@@ -359,7 +359,7 @@ def underconstrained_poses(
             status = _solve_in_stages(search, space, given, turned_by_tensions)
         solved = status == codes.POSE_SOLVED
         if solved:
-            inverse.measure_balance(platform, cables, balance, residuals[p])
+            inverse.measure_balance(None, platform, cables, balance, residuals[p])
         else:
             residuals[p, inverse.FORCE] = residuals[p, inverse.MOMENT] = math.nan
             copy(starts[p], pose)

@@ -130,7 +130,7 @@ def _distributes_tensions(
     status = set_pose(curves.model, limits, codes.CHORD_TENSION, weight, platform, curves.cables, balance)
     if status == codes.POSE_SOLVED:
         status = distribute_and_solve_cables(
-            curves.model, distribution, platform, curves.cables, balance, near, None, curves.statuses
+            curves.model, distribution, platform, curves.cables, balance, near, None, None, curves.statuses
         )
     if status == codes.POSE_SOLVED:
         copy(curves.cables.tau, tau)
