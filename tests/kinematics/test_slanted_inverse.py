@@ -79,11 +79,11 @@ def test_stability_is_that_of_the_stiffness(kind: str) -> None:
 def test_a_slightly_slanted_axis_continues_the_tensions_of_the_vertical_axis() -> None:
     tilted, vertical = (sl.inverse(with_axes([tilt, 0.0, 1.0], 0.15), POSES) for tilt in (1e-9, 0.0))
     for name in ("frame_end_tension", "horizontal_tension", "vertical_force"):
-        ends = (getattr(plan.state.cables, name) for plan in (tilted, vertical))
-        np.testing.assert_allclose(*ends, rtol=2e-3)
+        found, known = (getattr(plan.state.cables, name) for plan in (tilted, vertical))
+        np.testing.assert_allclose(found, known, rtol=2e-3)
     np.testing.assert_allclose(tilted.unstrained_length, vertical.unstrained_length, atol=2e-6)
-    found = sl.forward(with_axes([1e-9, 0.0, 1.0], 0.15), vertical.unstrained_length, POSES)
-    np.testing.assert_allclose(found.state.pose.position, PLACE, atol=1e-8)
+    reached = sl.forward(with_axes([1e-9, 0.0, 1.0], 0.15), vertical.unstrained_length, POSES)
+    np.testing.assert_allclose(reached.state.pose.position, PLACE, atol=1e-8)
 
 
 def test_closest_tensions_keep_their_reference_beside_infeasible_samples() -> None:
