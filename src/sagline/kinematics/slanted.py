@@ -99,8 +99,8 @@ def solve_slanted_axes(
             exits = np.where(lost[:, None, None], _tangent_exits(robot, pose, table), np.nan)
             repeated = _pass_by_pass(run, exits[which], which)[0]
             found.results[:, which] = repeated.results
-            for whole, part in zip(found[1:], repeated[1:], strict=True):
-                whole[which] = part
+            for name in InverseRows._fields[1:]:
+                getattr(found, name)[which] = getattr(repeated, name)
     found.results[tables.LENGTH] += found.results[tables.WRAPPED] + found.results[tables.DEAD]
     return found, rows
 
