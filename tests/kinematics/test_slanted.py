@@ -182,7 +182,6 @@ REFUSING: dict[str, Callable[[], object]] = {
     "margin": lambda: sl.margin(SOME_SLANTED, POSE),
     "InverseSolver": lambda: sl.InverseSolver(SOME_SLANTED),
     "vibration": lambda: sl.vibration(SOME_SLANTED, POSE),
-    "simulate": lambda: sl.simulate(SOME_SLANTED, POSE, duration=0.05),
     "workspace": lambda: sl.workspace(SOME_SLANTED, cells=4),
     "fastest": lambda: sl.fastest(SOME_SLANTED, sl.quintic_path([(0.0, 0.0, 1.5), (0.5, 0.3, 1.8)], speed=0.5)),
     "design": lambda: sl.design(

@@ -97,7 +97,10 @@ def refuse_slanted(robot: Robots) -> None:
         if winches.slanted.any():
             cable = int(np.argmax(winches.slanted))
             shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
-            step = "Other axes: use inverse, forward, confirm, stiffness, modes or calibrate, without friction."
+            step = (
+                "Other axes: use inverse, forward, confirm, stiffness, modes, calibrate or simulate (massless cables), "
+                "without friction; or workspace, with fewer cables than freedoms."
+            )
             raise InvalidValueError(f"winches: swivel_axis[{cable}]", f"({shown})", "up or down here", step)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, locked
+from sagline.core.arrays import Array, Flags, locked
 from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes
 from sagline.kernels.cable import geometry as rows
@@ -90,6 +90,12 @@ def chord_geometry(robot: Robots, pose: Pose, slanted: bool = False) -> Array:
     with np.errstate(all="ignore"):
         cable_geometries(cables, body_table(robot), poses, np.empty((3, 3)), out)
     return out
+
+
+def has_chords(robot: Robot, pose: Pose) -> Flags:
+    """True for poses (N,) at which every cable has a chord."""
+    chord = chord_geometry(robot, pose, slanted=True)[:, rows.CHORD]
+    return np.asarray((chord >= SHORTEST_CHORD).all(axis=1))
 
 
 def touching_angle(robot: Robot, pose: Pose) -> Array:

@@ -10,16 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.kernels import codes
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_rows import Given, decide_stability, given_codes, solve_underconstrained_rows
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.batch import has_slanted_axes
 from sagline.robot.equilibrium import cables_of_results, limited_tension
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.statics.tables import has_chords
 from sagline.workspaces.margin import Bracket
 from sagline.workspaces.region import Orientations
 from sagline.workspaces.wrench_sets import WrenchSet
@@ -68,17 +70,32 @@ class BalancedMargins:
     def _found_by(self, robot: Robot, rows: Array, load: Array) -> tuple[Array, Indices]:
         """Distances (N,) [N] and limiting cables (N,) of equilibria of `robot`; -infinity without one."""
         model = self._model
+        if has_slanted_axes(robot):
+            return self._found_by_inverse(robot, rows, load)
         found, placed = solve_underconstrained_rows(
             robot, model, rows, locked(load[None]), self._given, level=0.0, chained=False, stability=True
         )
         decide_stability(robot, (model.code, *model.parameters), placed, found)
         solved = found.pose_status == codes.POSE_SOLVED
         state = cables_of_results(robot, model, found.results, found.cable_status, (len(rows),))
-        tension = limited_tension(self._robot, *state)
+        return self._distances(limited_tension(robot, *state), solved, found.blocking)
+
+    def _found_by_inverse(self, robot: Robot, rows: Array, load: Array) -> tuple[Array, Indices]:
+        """`_found_by` for swivel axes of any direction. Poses inside a pulley have no equilibrium."""
+        pose = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
+        outside = has_chords(robot, pose)
+        value, cable = np.full(len(rows), -np.inf), np.full(len(rows), -1)
+        if outside.any():
+            plan = inverse(robot, pose[outside], self._model, wrench=load, given=self._names)
+            value[outside], cable[outside] = self._distances(plan.state.limited_tension, plan.solved, plan.blocking)
+        return value, cable
+
+    def _distances(self, tension: Array, solved: Flags, blocking: Flags) -> tuple[Array, Indices]:
+        """Smallest distances (N,) [N] of the tensions (N, m) from the limits, and their cables; -infinity unsolved."""
         distance = np.minimum(tension - self._robot.tension_min, self._robot.tension_max - tension)
         distance[np.isnan(distance)] = -np.inf
-        distance = np.where(solved[:, None], distance, np.where(found.blocking, -np.inf, np.inf))
-        cable = np.where(solved | found.blocking.any(axis=1), distance.argmin(axis=1), -1)
+        distance = np.where(solved[:, None], distance, np.where(blocking, -np.inf, np.inf))
+        cable = np.where(solved | blocking.any(axis=1), distance.argmin(axis=1), -1)
         return np.where(solved, distance.min(axis=1), -np.inf), cable
 
     def reason(self, pose: Pose) -> tuple[tuple[int, ...], str]:

@@ -21,6 +21,7 @@ from sagline.kernels.dynamics import chains as run
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.progress import COUNTERS, FAILED
+from sagline.robot.batch import refuse_slanted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +103,7 @@ class ChainPlant(Plant):
         if given.model.code != codes.CATENARY:
             name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
             raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
+        refuse_slanted(given.robot)
         light = np.flatnonzero(~(given.robot.cables.linear_density > 0.0))
         if light.size:
             item, step = f"cable {light[0]}: linear_density", 'Give a density, or cable_mass="none".'

@@ -69,7 +69,7 @@ class Plant:
         self.inertia = np.array([robot.mass, *moments])
         self.cables: Indices = np.arange(m)  # cable of each row: unbroken cables, and pieces of broken cables with mass
         self.broken: list[int] = []  # broken cables
-        self._table = cable_table(robot)[0].copy()
+        self._table = cable_table(robot, slanted=True)[0].copy()
         anchors = slice(tables.PLATFORM_X, tables.PLATFORM_Z + 1)
         self._table[:, anchors] = (robot.platform_anchors - robot.center_of_mass) @ self.axes
         self.points = 0  # recorded points per cable with mass

@@ -141,6 +141,9 @@ def _fill_frame_end_tensions(
         else:
             tension, pulley = rows[g.LEAVING, i], pulley_at(cables, i)
             height = pulley.radius * pulley.entry * rows[g.WRAP_SINE, i]
+            if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
+                outward = (1.0 - rows[g.WRAP_COSINE, i]) * rows[g.CENTER_Z, i]
+                height = pulley.radius * (outward + rows[g.WRAP_SINE, i] * cables[i, tables.AXIS_Z])
         whole = tension + 0.5 * tension * tension / stiffness - weight * height
         now[d.AT_FRAME, i] = now[d.PULL, i] = tension
         now[d.WHOLE, i] = whole
