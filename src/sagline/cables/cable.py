@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sagline.core.arguments import check_memory, choice, flag
 from sagline.core.arrays import Array, broadcast_shape, checked, locked, spread
 from sagline.core.errors import InvalidValueError
-from sagline.core.fields import given, if_known, rule
+from sagline.core.fields import given, if_known, reduced, rule
 from sagline.kernels import creep_strains
 
 
@@ -147,13 +147,7 @@ class Cable:
             object.__setattr__(part, name, value)
         return part
 
-    def __reduce__(self) -> tuple[Any, tuple[dict[str, Array]]]:
-        """Pickle the cable as a call of the constructor, which checks the loaded fields and makes them read-only."""
-        return _from_fields, (self.known(),)
-
-
-def _from_fields(values: dict[str, Array]) -> Cable:
-    return Cable(**values)
+    __reduce__ = reduced
 
 
 MOST_ELEMENTS = 2

@@ -108,7 +108,8 @@ def swivel_rows(
                 slopes[:, i, where[row, i]] += scale[row, i] * change
     residual = np.zeros(reach.shape[:2])
     if readings is not None:
-        residual = _principal_angles(readings - _angles_about(reach, zero) - zeros)
+        off = readings - _angles_about(reach, zero) - zeros
+        residual = np.remainder(off + np.pi, 2.0 * np.pi) - np.pi  # between -pi and pi
     return FurtherRows(residual, slopes, by_length)
 
 
@@ -231,11 +232,6 @@ def _change_data(
         change = np.trace(half + half.T) * np.eye(3) - (half + half.T)
         for sign, begin in ((1.0, 1), (-1.0, 1 + count)) if q >= 0 else ():
             at.inertia[(begin + q) * rows : (begin + q + 1) * rows] += sign * change
-
-
-def _principal_angles(angles: Array) -> Array:
-    """Angles between -pi and pi [rad] that differ from `angles` by full turns."""
-    return np.asarray(np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi)
 
 
 def circular_mean(angles: Array) -> float:

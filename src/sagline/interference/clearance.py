@@ -129,17 +129,14 @@ def _platform_of(robot: Robots) -> Box | None:
     """Box of the platform's size around its anchors; None if unknown. Robots with unequal platforms are refused."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
-        if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
+        own = "platform_size", "platform_anchors"
+        if not all(np.array_equal(getattr(one, name), getattr(other, name)) for name in own):
             step = "Measure each robot separately, or give the form of the platform: platform=Box(...)."
             raise InvalidValueError("platform_size", "not the same for all robots", "one platform", step)
     if one.platform_size is None:
         return None
     low, high = one.platform_anchors.min(axis=0), one.platform_anchors.max(axis=0)
     return Box(one.platform_size, 0.5 * (low + high), name="platform")
-
-
-def _alike(one: Array | None, other: Array | None) -> bool:
-    return one is other is None or (one is not None and other is not None and np.array_equal(one, other))
 
 
 NO_TENSIONS = "no tensions are known, so that the cables have no shape; use a feasible pose"

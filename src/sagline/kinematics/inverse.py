@@ -126,7 +126,9 @@ def inverse(
     values = inverse_rows.given_codes(shared, given)
     options = kernel_options(robots, model, method) if values is None else None
     rows, path = pose_rows(pose), motion if isinstance(motion, Path) else None
-    load = _load_of(robots, pose, path, wrench)
+    load = external_wrench(wrench, len(pose) if pose.shape else None)
+    if path is not None:
+        load = locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
     loads = np.atleast_2d(load)
     slanted = has_slanted_axes(robots)
     reference = None if options is None else _reference(shared, previous, tension.variable)
@@ -167,14 +169,8 @@ def _check_poses(robots: Robot | tuple[Robot, ...], pose: Pose) -> None:
     """Refuse poses that are out of reach, or outside the plane of a planar robot, or too many."""
     shared = first_of(robots)
     check_reach(shared, pose, "pose")
-    _check_plane(shared, pose, "pose")
+    _check_plane(shared, pose)
     check_poses(len(pose) if pose.shape else 1, shared.cable_count, has_routing(robots))
-
-
-def _load_of(robots: Robot | tuple[Robot, ...], pose: Pose, path: Path | None, wrench: ArrayLike | None) -> Array:
-    """External wrench, plus the inertial wrench of a path, shape (6,) or (N, 6)."""
-    load = external_wrench(wrench, len(pose) if pose.shape else None)
-    return load if path is None else locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
 
 
 def _state_of(
@@ -233,12 +229,12 @@ def _plan_of(
     )
 
 
-def _check_plane(robot: Robot, pose: Pose, item: str) -> None:
+def _check_plane(robot: Robot, pose: Pose) -> None:
     """Refuse poses of a planar robot at which the cables would not be in the plane of the frame anchors."""
     away = _out_of_plane(robot, pose)
     if (outside := np.flatnonzero(np.abs(away) > ROUNDING)).size:
         k = int(outside[0])
-        name = f"{item}[{k}]" if pose.shape else item
+        name = f"pose[{k}]" if pose.shape else "pose"
         value = f"{away[k]:.6g} m along plane_normal from the plane of the frame anchors"
         step = "Project the poses onto the plane, or choose another motion_pattern of the robot."
         raise InvalidValueError(name, value, f"0 m, by motion_pattern {robot.motion_pattern}", step)

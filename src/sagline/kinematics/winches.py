@@ -72,7 +72,10 @@ def encoder_counts(
     drums = Drums.of(robot)
     longer = warmth(robot, temperature)
     if creep is not None:
-        longer = longer * (1.0 + _creep_strain(plan, creep))
+        if plan.path is None:
+            step = "Plan along a Path, or omit creep."
+            raise InvalidValueError("creep", "given for a plan without a path", "a path with times", step)
+        longer = longer * (1.0 + creep.strain(plan.path.time, plan.chord_tension))
     shape = plan.unstrained_length.shape
     length = np.atleast_2d(plan.unstrained_length / longer)
     if winding == "constant":
@@ -149,13 +152,6 @@ def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array
     paths, strains = (kernel_input(each, given.shape) for each in (given, strain))
     follow_memory(paths, strains, drums.rest_strain, unstrained, found, memory)
     return found
-
-
-def _creep_strain(plan: Plan, creep: Creep) -> Array:
-    if plan.path is None:
-        step = "Plan along a Path, or omit creep."
-        raise InvalidValueError("creep", "given for a plan without a path", "a path with times", step)
-    return creep.strain(plan.path.time, plan.chord_tension)
 
 
 def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:

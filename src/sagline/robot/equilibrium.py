@@ -248,7 +248,9 @@ def cables_of_results(
         if len(results) > tables.RESULT_ROWS:
             contact = replace(contact, azimuth=row(tables.AZIMUTH))
         length = locked(length - (contact.wrapped_length + contact.dead_length))
-        tension = locked(_free_chord_tension(span, rise, row(tables.HORIZONTAL), tension))
+        # the horizontal tension of a vertical span is zero
+        slope = np.hypot(span, rise) / np.where(span > 0.0, span, 1.0)
+        tension = locked(np.where(span > 0.0, row(tables.HORIZONTAL) * slope, tension))
     cables = CableState(
         model=model,
         cable=batch.cables_of(robot),
@@ -262,10 +264,3 @@ def cables_of_results(
         status=locked(status.reshape(*shape, m)),
     )
     return cables, contact
-
-
-def _free_chord_tension(span: Array, rise: Array, horizontal: Array, tension: Array) -> Array:
-    """Chord tensions of the free spans [N]; `tension` for a vertical span, whose horizontal tension is zero."""
-    level = np.where(span > 0.0, span, 1.0)
-    own: Array = np.where(span > 0.0, horizontal * (np.hypot(span, rise) / level), tension)
-    return own

@@ -17,7 +17,6 @@ _HOME_DECIMALS: Final = 9  # decimals of the home position [m]; they hide roundi
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 # [rad] and [m]; smaller deviations count as zero, because poses may be given with seven digits
 ROUNDING = 1e-6
-_FEWER_CABLES: Final = "Add cables, or use inverse, forward, vibration and workspace, which allow fewer."
 
 
 def is_underconstrained(robot: Robot) -> bool:
@@ -25,10 +24,11 @@ def is_underconstrained(robot: Robot) -> bool:
     return robot.cable_count < robot.degrees_of_freedom
 
 
-def check_cable_count(robot: Robot, name: str | None = None, step: str = _FEWER_CABLES) -> None:
-    """Refuse an underconstrained robot; name: name of the robot in the message; step: next step in the message."""
+def check_cable_count(robot: Robot, name: str | None = None) -> None:
+    """Refuse an underconstrained robot; name: name of the robot in the message."""
     if is_underconstrained(robot):
         allowed = f">= {robot.degrees_of_freedom} for {robot.motion_pattern}"
+        step = "Add cables, or use inverse, forward, vibration and workspace, which allow fewer."
         raise InvalidValueError(f"{name or robot.name}: number of cables", robot.cable_count, allowed, step)
 
 

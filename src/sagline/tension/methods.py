@@ -306,6 +306,6 @@ def methods_by_name() -> dict[str, type[TensionMethod]]:
     return ordered_classes("sagline.tension")
 
 
-def method_of(value: TensionMethod | str, item: str = "tension") -> TensionMethod:
+def method_of(value: TensionMethod | str) -> TensionMethod:
     """Tension distribution method `value`, or the method with the name `value`, such as "minimum-norm"."""
-    return named(value, TensionMethod, methods_by_name(), item)
+    return named(value, TensionMethod, methods_by_name(), "tension")

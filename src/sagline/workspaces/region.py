@@ -141,7 +141,7 @@ class Tilts:
             InvalidValueError: If the platform cannot rotate.
         """
         if self.angle == 0.0:
-            return _level()
+            return Orientations._of(LEVEL[None].copy(), "all")
         check_tilt(robot, self.angle, "orientations: tilt")
         if robot.motion_pattern in PLANAR and robot.plane_normal is not None:
             axes, angles = np.repeat(robot.plane_normal[None], len(_SHARES), axis=0), self.angle * _SHARES
@@ -149,11 +149,6 @@ class Tilts:
             axes, angles = _AXES, np.full(len(_AXES), self.angle)
         turned = np.hstack((np.sin(0.5 * angles)[:, None] * axes, np.cos(0.5 * angles)[:, None]))
         return Orientations._of(np.vstack((LEVEL, turned)), "all")
-
-
-def _level() -> Orientations:
-    """Set that contains only the level orientation."""
-    return Orientations._of(LEVEL[None].copy(), "all")
 
 
 def check_tilt(robot: Robot, angle: float, item: str) -> None:

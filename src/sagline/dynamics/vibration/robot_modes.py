@@ -102,7 +102,7 @@ class VibrationModel(NamedTuple):
 
     def modes(self, row: int, up_to: float) -> StateModes:
         """Modes of the state `row` below `up_to` [Hz]. The exact count checks the number of modes."""
-        _check_string_count(self.strings, row, up_to, "up_to")
+        _check_string_count(self.strings, row, up_to)
         count = self.checked_count(row, up_to, "up_to")
         problem = self.reduced(row, up_to)
         square, vectors = np.linalg.eigh(problem.matrix)
@@ -213,8 +213,8 @@ class StateModes:
         return np.asarray(damping.modal_damping + ratio)
 
 
-def _check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
-    """Reject `frequency` [Hz] before the exact count if the cables have far too many modes below it."""
+def _check_string_count(strings: Strings, row: int, up_to: float) -> None:
+    """Reject `up_to` [Hz] before the exact count if the cables have far too many modes below it."""
     # In each of two directions, N half waves of a cable have the phase pi N. This phase is the integral of omega
     # sqrt(rho/T) along the cable. The tension is T_x cosh(q) at the point with the vertical force T_x sinh(q).
     table = strings.table[row, strings.taut[row]]
@@ -225,8 +225,8 @@ def _check_string_count(strings: Strings, row: int, frequency: float, item: str)
     even = table[:, columns.LENGTH] / np.sqrt(level * np.cosh(last))  # of a cable without weight
     slow = np.trapezoid(np.sqrt(level * np.cosh(q)), q, axis=0) / np.maximum(table[:, columns.WEIGHT], _TINY)
     time = np.sqrt(table[:, columns.DENSITY]) * np.where(last - first > _EVEN, slow, even)  # of a wave along the cable
-    count = float(4.0 * frequency * time.sum())
+    count = float(4.0 * up_to * time.sum())
     if count > _CERTAIN * MOST_MODES:
-        value = f"{frequency:g} Hz, below which the cables have about {count:,.0f} modes"
+        value = f"{up_to:g} Hz, below which the cables have about {count:,.0f} modes"
         step = "Lower it, or shorten the slack cables."
-        raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", step)
+        raise InvalidValueError("up_to", value, f"a frequency with up to {MOST_MODES:,} modes below it", step)

@@ -114,12 +114,6 @@ def plus(a: Triple, b: Triple) -> Triple:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@formula
-def _scaled(factor: float, vector: Triple) -> Triple:
-    """A multiple of a vector."""
-    return factor * vector[0], factor * vector[1], factor * vector[2]
-
-
 @glue
 def _fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, motion: Array) -> None:
     """Fill the `motion` of the platform due to `wrench` on the platform. The stiffness must be factored."""
@@ -263,7 +257,7 @@ def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple
         six = space.six
         if j < m:
             own = plus(_tension_by_motion(space.ends, j, space.shares), (0.0, 0.0, space.shares[j, 3]))
-            force = _scaled(sensing.gain[j], own)
+            force = (sensing.gain[j] * own[0], sensing.gain[j] * own[1], sensing.gain[j] * own[2])
             moment = cross(_lever_of(space.rows, j), force)
         elif j < m + 3:
             force = _column_of(space.axes, j - m)

@@ -112,7 +112,9 @@ def choose_basis(facets: Facets, n: int, m: int, lever: float, full: bool) -> bo
             return False
         _exchange_rows(table, k, row)
         basis[k] = column
-        _scale_row(table[k], 1.0 / table[k, column])
+        scale = 1.0 / table[k, column]
+        for j in range(table.shape[1]):
+            table[k, j] *= scale
         for j in range(0 if full else k, n):
             if j != k:
                 _subtract_row(table[j, :width], table[j, column], table[k])
@@ -144,13 +146,6 @@ def _exchange_rows(table: Array, k: int, row: int) -> None:
     """Exchange the rows `k` and `row`."""
     for j in range(table.shape[1]):
         table[k, j], table[row, j] = table[row, j], table[k, j]
-
-
-@formula
-def _scale_row(row: Array, factor: float) -> None:
-    """Multiply `row` by `factor`."""
-    for j in range(row.size):
-        row[j] *= factor
 
 
 @formula
