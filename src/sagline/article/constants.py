@@ -52,16 +52,11 @@ def _over_chord(platform: fits.InterceptStudy, frame: fits.InterceptStudy) -> Fi
         ax.plot(sampling.chords, platform.intercept[MIDDLE, :, k], color=color, marker="o", markersize=3.0, label=label)
         ax.plot(sampling.chords, frame.intercept[MIDDLE, :, k], color=color, marker="s", markersize=3.0, linestyle="--")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
+    caption = "b_π at φ = 0.754 rad: platform end (circles, solid), frame end (squares, dashed)."
     return finding(
         "b-over-chord",
         numbers={"nonproportional_share_platform": platform.bend, "nonproportional_share_frame": frame.bend},
-        panels=(
-            (
-                figure,
-                "b_π at φ = 0.754 rad: platform end (circles, solid), frame end (squares, dashed).",
-                r"$\rho$ [kg/m]",
-            ),
-        ),
+        panels=((figure, caption, r"$\rho$ [kg/m]"),),
     )
 
 

@@ -152,16 +152,8 @@ def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
     strip = floor * (floor / high) ** 0.09  # the shaded area is as high as a line of text
     ax.set_ylim(strip, high)
     ax.axhspan(strip, floor, facecolor=GAP_COLOR, linewidth=0.0, zorder=3.0)
-    ax.text(
-        0.5,
-        (floor * strip) ** 0.5,
-        told,
-        transform=ax.get_yaxis_transform(),
-        zorder=3.1,
-        fontsize=NAME_SIZE,
-        ha="center",
-        va="center",
-    )
+    look: dict[str, Any] = {"fontsize": NAME_SIZE, "ha": "center", "va": "center", "zorder": 3.1}
+    ax.text(0.5, (floor * strip) ** 0.5, told, transform=ax.get_yaxis_transform(), **look)
 
 
 def shades(number: int) -> list[tuple[float, float, float, float]]:

@@ -42,6 +42,7 @@ def _constants(fit: EmpiricalFit) -> Finding:
         (name, n(estimate.value, ".4f"), f"{n(estimate.low, '.4f')} to {n(estimate.high, '.4f')}", unit)
         for name, estimate, unit in (("k_h", fit.k_h, "m/s²"), ("k_p", fit.k_p, "m²/s⁴"))
     ]
+    sampled = f"{len(fit.spans)} spans and {len(fit.tensions)} tensions"
     return finding(
         "empirical-fit",
         numbers={
@@ -52,13 +53,7 @@ def _constants(fit: EmpiricalFit) -> Finding:
             "k_p": fit.k_p._asdict(),
             "largest_position_error_m": fit.position_error.max(),
         },
-        panels=(
-            (
-                figure,
-                f"Position error (20), the largest value over all rises, for {len(fit.spans)} spans and "
-                f"{len(fit.tensions)} tensions.",
-            ),
-        ),
+        panels=((figure, f"Position error (20), the largest value over all rises, for {sampled}."),),
         data=(Table("The constants", ("constant", "value", "95 % interval", "unit"), rows),),
         spans_last=SPANS[-1],
         rises_last=RISES[-1],
@@ -121,12 +116,7 @@ def _made_up_fit(cable: sl.Cable, lowest: float, highest: float, unknowns: tuple
     span, rise = random.uniform(2.0, 12.0, SAMPLES), random.uniform(-4.0, 2.0, SAMPLES)
     tension: Array = random.uniform(lowest, highest, SAMPLES)
     state = sl.Catenary().from_tension(cable, span, rise, tension)
-    return identify_cable(
-        span,
-        rise,
-        state.unstrained_length + random.normal(0.0, LENGTH_ERROR, SAMPLES),
-        state.frame_end_tension + random.normal(0.0, TENSION_ERROR, SAMPLES),
-        length_error=LENGTH_ERROR,
-        tension_error=TENSION_ERROR,
-        unknowns=unknowns,
-    )
+    length = state.unstrained_length + random.normal(0.0, LENGTH_ERROR, SAMPLES)
+    measured = state.frame_end_tension + random.normal(0.0, TENSION_ERROR, SAMPLES)
+    data = span, rise, length, measured
+    return identify_cable(*data, length_error=LENGTH_ERROR, tension_error=TENSION_ERROR, unknowns=unknowns)

@@ -278,18 +278,10 @@ def _models(study: PathStudy) -> Finding:
     rows, numbers = [], {}
     for model, first, second in zip(study.models, study.suspended, study.mixed, strict=True):
         pair, name = (figures(first), figures(second)), type(model).__name__
-        rows.append(
-            (
-                name,
-                *(
-                    n(1e3 * value, ".3g", size=1e3 * f.length_max)
-                    for f in pair
-                    for value in (f.error_max, f.error_mean)
-                ),
-                *(n(f.tension_max, ".1f") for f in pair),
-                *(n(100 * f.held, ".4g") for f in pair),
-            )
-        )
+        sizes = [(value, f.length_max) for f in pair for value in (f.error_max, f.error_mean)]
+        errors = [n(1e3 * value, ".3g", size=1e3 * longest) for value, longest in sizes]
+        highest, held = [n(f.tension_max, ".1f") for f in pair], [n(100 * f.held, ".4g") for f in pair]
+        rows.append((name, *errors, *highest, *held))
         numbers[name] = {"suspended_mm": 1e3 * pair[0].error_max, "mixed_mm": 1e3 * pair[1].error_max}
     head = ["model", "max, suspended", "mean", "max, mixed", "mean", "T_x suspended", "T_x mixed"]
     panels = []
