@@ -24,6 +24,9 @@ from sagline.kernels.calibration import kinds
 from sagline.kinematics.forward_rows import solve_forward_rows
 
 SIGNIFICANT: Final = 1e-13  # an eigenvalue counts as zero if it is smaller than this share of the largest eigenvalue
+# largest number of multiplications in a matrix product; OpenBLAS wakes its threads for larger products, and these
+# threads then take processor time until the next product
+PRODUCT: Final = 1 << 18
 STEPS: Final = 60
 HALVINGS: Final = 5
 TOLERANCE: Final = 1e-5  # smallest worthwhile decrease of the sum of squares: 3e-3 standard deviations, squared
@@ -167,9 +170,12 @@ def evaluate_step(
         factor, flat, misses = np.sqrt(weights[part]), rows.matrix, rows.misfit
         if not (factor == 1.0).all():
             flat, misses = flat[there] * factor[there, None, None], misses[there] * factor[there, None]
-        flat = flat.reshape(-1, width)
-        matrix += flat.T @ flat
-        gradient += flat.T @ misses.reshape(-1)
+        flat, misses = flat.reshape(-1, width), misses.reshape(-1)
+        size = max(PRODUCT // width**2, 1)
+        for first in range(0, len(flat), size):
+            some = flat[first : first + size]
+            matrix += some.T @ some
+            gradient += some.T @ misses[first : first + size]
     return after, Normal(matrix, gradient, squares, readings, weights, rows if count <= BLOCK else None)
 
 
