@@ -151,7 +151,6 @@ class _Group(TyperGroup):
         return str(super().get_help(ctx))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the commands in groups, with equal columns."""
         wide = max(map(len, NAMES))
         for title, names in GROUPS.items():
             with formatter.section(title):

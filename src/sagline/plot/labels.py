@@ -65,7 +65,7 @@ def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outs
 
 
 def legend_above(ax: Axes, labels: Sequence[str]) -> dict[str, Any]:
-    """Arguments for a legend above the axes `ax`, with as many columns as fit."""
+    """Arguments for a legend above the axes `ax`, with as many columns as fit with one more entry."""
     size, width = current().tick, cast(Figure, ax.get_figure(root=True)).get_figwidth()
     return {**ABOVE, "ncols": legend_columns([*labels, ""], 0.85 * width, size), "fontsize": size, "borderaxespad": 0.1}
 

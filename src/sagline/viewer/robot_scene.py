@@ -101,7 +101,7 @@ class Nodes:
 # Colors have a contrast of at least 3 : 1 on the white and on the dark background, except for the floor.
 STEEL, DRUM, FLOOR, SECTION = (120, 128, 138), (104, 112, 122), (172, 178, 186), (132, 138, 146)
 PLATFORM, INFEASIBLE, REST = (58, 134, 201), (220, 56, 48), (200, 118, 16)
-TRUTH = (150, 90, 190)
+TRUTH, MARK = (150, 90, 190), (200, 60, 130)  # the second one for the user's force and a chosen cable
 SKY, GROUND, SKYLIGHT = (255, 255, 255), (130, 130, 130), 3.5  # light from above and below, and its intensity
 WANTED, ACTUAL = PLATFORM, REST  # colors of the desired and the actual path
 GHOST = (128, 134, 142)

@@ -22,7 +22,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.player import PlayerState
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
-from sagline.viewer.robot_scene import Nodes
+from sagline.viewer.robot_scene import MARK, Nodes
 from sagline.viewer.server import finite_numbers
 from sagline.viewer.tension_scale import ForceUnit, cables_text
 
@@ -32,7 +32,6 @@ ELEMENTS: Final = 10  # elements of a cable with mass; twice as many take four t
 CABLE_MASS = {"massless": "none", "with cable mass": "lumped"}
 TOP = -10.0  # order value, above all other controls
 HELP: Final = sentence("Click a cable in the scene, or choose one.")
-MARK: Final = (200, 60, 130)  # color with a contrast of 3 : 1 on both backgrounds
 _WIDTH: Final = 7.0  # width of the mark [px]
 _PLACE: Final = 0.4  # position of the name along the cable, from the frame end
 TOPIC: Final = "pick"  # topics of the messages of browser/hand.js

@@ -14,14 +14,13 @@ from sagline.statics.slopes import platform_end_forces
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import css_color, html_block, sentence, swatch
-from sagline.viewer.robot_scene import Nodes
+from sagline.viewer.robot_scene import INFEASIBLE, Nodes
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import NONE, Color, ForceUnit, cable_color, number_text
 
 WEIGHT, LOAD, MISSING = "weight", "load", "missing"
 WEIGHT_COLOR: Color = NONE
 LOAD_COLOR: Color = (120, 112, 104)
-MISSING_COLOR: Color = (220, 56, 48)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +45,7 @@ def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tupl
     weight = np.array([0.0, 0.0, -robot.mass * robot.gravity, 0.0, 0.0, 0.0])
     forces.append(_PlatformForce(WEIGHT, WEIGHT_COLOR, weight, center))
     lacking = np.zeros(6) if missing is None else missing
-    for name, color, wrench in ((LOAD, LOAD_COLOR, state.wrench - lacking), (MISSING, MISSING_COLOR, lacking)):
+    for name, color, wrench in ((LOAD, LOAD_COLOR, state.wrench - lacking), (MISSING, INFEASIBLE, lacking)):
         if np.linalg.norm(wrench) > 0.0:
             forces.append(_PlatformForce(name, color, wrench, center))
     return tuple(forces)

@@ -27,7 +27,7 @@ from sagline.viewer.feature import Feature, View
 from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
-from sagline.viewer.robot_scene import NO_SHADOW, Nodes
+from sagline.viewer.robot_scene import MARK, NO_SHADOW, Nodes
 from sagline.viewer.server import finite_numbers
 from sagline.viewer.shapes import Solid, placed_balls, readable
 from sagline.viewer.tension_scale import ForceUnit
@@ -176,7 +176,6 @@ def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[flo
     return low, high
 
 
-COLOR: Final = (200, 60, 130)  # color with a contrast of 3 : 1 on both backgrounds, different from platforms
 GHOST_OPACITY, BALL_OPACITY = 0.5, 0.3
 _ARROW: Final = np.array([0.003, 0.009, 0.025])  # radii of shaft and head, length of the head, per size of the robot
 _BELOW: Final = 0.03  # distance of the reserve's label below the point, as a share of the robot's size
@@ -325,20 +324,20 @@ class PushFeature(Feature):
         if self.hold is None:
             arrow = arrow * min(1.0, LONGEST * size / max(float(np.linalg.norm(arrow)), 1e-300))
         tip, below = start + arrow, start - np.array([0.0, 0.0, _BELOW * size])
-        nodes.arrows("/push", np.stack((start, tip))[None], COLOR, *(_ARROW * size))
+        nodes.arrows("/push", np.stack((start, tip))[None], MARK, *(_ARROW * size))
         nodes.label("/push_tip", f"{unit.written(response.force)}: moves {_motion_text(response)}", tip)
         nodes.label("/push_below", _reserve_text(response, response.reserve, unit), below, "top-center", 0.85)
         pose = response.scaled_pose(error_scale)
         if pose is None:
             nodes.hide("/pushed")
         else:
-            nodes.body("/pushed", self.body, COLOR, GHOST_OPACITY, pose)
+            nodes.body("/pushed", self.body, MARK, GHOST_OPACITY, pose)
         if drawn_for is None:
             nodes.hide("/gives_way")
         else:
             (wxyz,), ((x, y, z),) = placed_balls(drawn_for * lengths[None], directions[None])
             looks: dict[str, Any] = {"wxyz": wxyz, "scale": (x, y, z), "position": start, **NO_SHADOW}
-            nodes.mesh("/gives_way", *self._ball, COLOR, BALL_OPACITY, **looks)
+            nodes.mesh("/gives_way", *self._ball, MARK, BALL_OPACITY, **looks)
         self._text.content, self._release.visible = response_text(response, drawn_for), True
         self.response = response
 
