@@ -67,7 +67,7 @@ def shortened_commands(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.article.CELLS", 4)
     monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
     monkeypatch.setattr("sagline.workspaces.levels._EVALUATIONS", 30)
-    monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
+    monkeypatch.setattr("sagline.article.report._ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.output.Output.draw", lambda *_: None)
 
     def started(host: str, port: int, title: str, **_: Any) -> Any:

@@ -131,7 +131,7 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.view._view_run", serve_run)
     monkeypatch.setattr("sagline.cli.view._view_calibration", serve_found)
     monkeypatch.setattr("sagline.cli.view._view_log", serve_log)
-    monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
+    monkeypatch.setattr("sagline.article.report._ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.article.FIGURES", ())
     monkeypatch.setattr("sagline.cli.article.CELLS", 4)
     monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())

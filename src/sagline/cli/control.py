@@ -49,8 +49,7 @@ def control(
     if priority is not None:
         set_priority(priority)  # before the threads of `link` and `log` start, which inherit the priority
     with ExitStack() as stack:
-        kind = sl.plc.ModbusLink if modbus else sl.plc.S7Link
-        link = stack.enter_context(closing(kind(plc, robot)))
+        link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
         record = None
         if log is not None:
             from sagline.files.mcap_writer import Recorder
@@ -60,6 +59,10 @@ def control(
         gc.collect()
         gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
         return OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow).run()
+
+
+def _link(robot: sl.Robot, plc: str, *, modbus: bool) -> sl.control.Link:
+    return sl.plc.ModbusLink(plc, robot) if modbus else sl.plc.S7Link(plc, robot)
 
 
 LOOK: Final = 0.1  # time between two checks of the PLCs [s]
