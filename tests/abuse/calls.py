@@ -269,7 +269,8 @@ def _robots(given: _Given) -> dict[str, Call]:
     wound: dict[str, tuple[Any, ...]] = {
         field.name: ("array", [2.0, 1.0], field.default is None) for field in attrs.fields(sl.Winch)
     }
-    wound |= {"dead_rise": ("array", [0.5, -0.25]), "swivel_axis": ("array", [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])}
+    wound |= {"dead_rise": ("array", [0.5, -0.25]), "on_platform": ("array", [0.0, 0.0])}
+    wound |= {"swivel_axis": ("array", [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])}
     wound |= {
         "rolling_friction": ("array", [0.5, 0.25]),
         "guides": ("array", [[[1.0, 1.0, 2.0], [2.0, 1.0, 2.0]], [[1.0, 2.0, 2.0], [2.0, 2.0, 4.0]]], True),

@@ -12,7 +12,9 @@ from sagline.robot.batch import cables_of
 from tests.refusal import refused
 
 # fields with a number for each cable
-RULES = {field.name: field for field in attrs.fields(Winch) if field.name not in ("swivel_axis", "guides")}
+RULES = {
+    field.name: field for field in attrs.fields(Winch) if field.name not in ("swivel_axis", "on_platform", "guides")
+}
 # required in addition to a value of 2 or 3 for every field
 BESIDE: dict[str, dict[str, float]] = {"dead_rise": {"dead_cable": 5.0}}
 # values that a field refuses
@@ -62,6 +64,7 @@ def test_a_winch_without_data_is_an_eyelet_with_counted_turns() -> None:
         "load_cell_gain",
     }
     assert found.pop("swivel_axis").tolist() == [0.0, 0.0, 1.0]
+    assert found.pop("on_platform").tolist() is False
     assert all(field in (0.0, 1.0) for field in found.values())
 
 
@@ -115,6 +118,12 @@ def cases() -> list[Case]:
     axis = "swivel_axis"
     return [
         *found,
+        Case("on_platform", 2, "2", "true or false"),
+        Case("on_platform", [True, -1], "-1", "true or false", "[1]"),
+        Case("on_platform", [0.0, np.nan], "nan", "finite", "[1]"),
+        Case("on_platform", "up", "'up'", "numbers"),
+        Case("on_platform", [[True, False]], "of shape (1, 2)", "shape () or (m,)"),
+        Case("on_platform", None, "None", "numbers"),
         Case(axis, [0, 0, 0], "the zero vector", "a direction"),
         Case(axis, [[0, 0, 1], [0, 0, 0]], "the zero vector", "a direction", "[1]"),
         Case(axis, [0, 1], "of shape (2,)"),

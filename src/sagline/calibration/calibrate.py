@@ -41,6 +41,7 @@ from sagline.core.arrays import Flags, Indices, Progress, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted, n
 from sagline.kernels import codes
+from sagline.robot.batch import refuse_slanted
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
 
@@ -116,6 +117,7 @@ def calibrate(
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
     model = model_of(model)
+    refuse_slanted(robot, only_platform=True)
     _check_model(robot, model)
     _check_frequencies(robot, log)
     callback(progress, "progress")

@@ -19,7 +19,7 @@ from sagline.kernels.calibration.observe import SWIVEL_NUMBERS, observe, swivel_
 from sagline.kernels.calibration.terms import BESIDE, PoseReadings, SensingArrays
 from sagline.kernels.forward.platform import ForwardTerms
 from sagline.kernels.memory import memory_for
-from sagline.robot.batch import has_routing
+from sagline.robot.batch import has_routing, refuse_slanted
 from sagline.robot.drum import Drums
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -137,6 +137,7 @@ class MachineTerms(NamedTuple):
         swivel_zero: Array | float = 0.0,
     ) -> MachineTerms:
         """Arrays of a robot and its sensors; raises an error if counts need drum data that are missing."""
+        refuse_slanted(robot, only_platform=True)
         machine = cls(
             model,
             parameters,

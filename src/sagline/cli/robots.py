@@ -206,9 +206,11 @@ def _deviation_text(_: str, value: Array) -> str:
 
 
 def _winch_text(field: str, value: Any) -> str:
-    if field == "swivel_axis":
+    if field in ("swivel_axis", "on_platform"):
         words = {1.0: "up", -1.0: "down"}
-        ways = [words.get(axis[2], f"[{', '.join(f'{x:.4g}' for x in axis)}]") for axis in value]
+        ways = [str(one).lower() for one in value]
+        if field == "swivel_axis":
+            ways = [words.get(axis[2], f"[{', '.join(f'{x:.4g}' for x in axis)}]") for axis in value]
         return f"({', '.join(ways)})" if len(set(ways)) > 1 else ways[0]
     return value if isinstance(value, str) else _spread(value, digits=9)  # counts need more digits than lengths
 

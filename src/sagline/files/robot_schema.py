@@ -145,12 +145,25 @@ class _Winches(schema_of(units(Winch))):  # type: ignore[misc]
     """Schema of the winches and pulleys. Each value is one number for all cables, or a list."""
 
     swivel_axis: Annotated[Any, ""] = None  # a vector or a word
+    on_platform: Annotated[Any, ""] = None  # true or false
 
     def winches(self) -> Winch:
         """Create the winches. Missing values are the defaults of `Winch`."""
         if "swivel_axis" in self.model_fields_set:
             self.swivel_axis = _vectors(self.swivel_axis)
+        if "on_platform" in self.model_fields_set:
+            self.on_platform = _flags(self.on_platform)
         return Winch(**self.given("winches."))
+
+
+def _flags(value: object) -> object:
+    """1 for true and 0 for false, for all cables or in a list."""
+    if isinstance(value, list):
+        return [_flags(entry) for entry in value]
+    if not isinstance(value, bool):
+        allowed, step = "true or false, or a list of them", "Say where the winch is."
+        raise InvalidValueError("winches.on_platform", reprlib.repr(value), allowed, step)
+    return float(value)
 
 
 def _vectors(value: object) -> object:

@@ -20,7 +20,8 @@ CABLE_COLUMNS = 14
 MOVES = True  # False in exported C sources, whose frame anchors are fixed
 SWIVELS = True  # False in exported C sources, which are for vertical swivel axes only
 # A table with these columns as well has swivel axes of any direction: unit vector along the cable where it enters the
-# pulley. ENTRY is then NaN for an axis that is not vertical.
+# pulley. ENTRY is then NaN for an axis that is not vertical, and 0 for a pulley on the platform at PLATFORM_X, whose
+# axis is in the platform frame, and whose cable ends at FRAME_X.
 AXIS_X, AXIS_Y, AXIS_Z = 14, 15, 16
 SWIVEL_COLUMNS = 17
 

@@ -157,8 +157,7 @@ class Kinematics:
             raise InvalidValueError("model", "Straight()", "a cable model with stiffness", step)
         name = function.rpartition(".")[2]
         self.robot = without_guides(instance(robot, Robot, "robot"), function, f"sl.{name}")
-        if not self.slanted:
-            refuse_slanted(robot)
+        refuse_slanted(robot, only_platform=self.slanted)
         self.numpy, self.call = numpy, call
         self.freedom, self.body, self.table = robot_terms(robot, slanted=True)
         self.cables, self.free = robot.cable_count, robot.degrees_of_freedom

@@ -11,6 +11,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels import codes
 from sagline.motion.path import Path
+from sagline.robot.batch import refuse_slanted
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import guide_forces, tension_after
 from sagline.robot.winch import Winch
@@ -79,6 +80,7 @@ def frame_forces_of(state: Equilibrium, path: Path | None) -> FrameForces:
     """Forces of the cables on the frame; see `Plan.frame_forces`."""
     from sagline.statics.slopes import frame_end_forces  # not needed for a plan alone
 
+    refuse_slanted(state.robot, only_platform=True)
     robot, contact, exit_force = state.one_robot, state.contact, frame_end_forces(state)
     winches = robot.winches
     guided = np.zeros((*exit_force.shape[:-1], 0, 3))

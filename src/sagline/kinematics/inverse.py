@@ -24,7 +24,7 @@ from sagline.kinematics.slanted import solve_slanted_axes
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.anchors import AnchorMotion
 from sagline.motion.path import Path
-from sagline.robot.batch import first_of, has_routing, has_slanted_axes, one_a_pose
+from sagline.robot.batch import first_of, has_routing, has_slanted_axes, on_platform, one_a_pose
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import ROUNDING, check_reach
@@ -134,16 +134,21 @@ def inverse(
     reference = None if options is None else _reference(shared, previous, tension.variable)
 
     def solve(
-        terms: RobotTerms, which: Indices | None = None, swivels: Array | None = None, first: bool = True
+        terms: RobotTerms,
+        which: Indices | None = None,
+        swivels: Array | None = None,
+        first: bool = True,
+        more: Array | None = None,
     ) -> tuple[InverseRows, Array]:
-        """Results of the poses `which` for the robot arrays `terms`, and rows of the found poses."""
+        """Results of the poses `which` for the robot arrays `terms` and further loads, and rows of the found poses."""
         at, report = slice(None) if which is None else which, progress if first else None
-        some, acting = locked(rows[at]), locked(loads[at] if len(loads) > 1 else loads)
+        acting, proves = loads[at] if len(loads) > 1 else loads, stability and more is None
+        some, acting = locked(rows[at]), locked(acting if more is None else acting + more)
         if options is None or reference is None:
             asked = values, number(level, "level", "N"), path is not None, stability, report
             return inverse_rows.solve_underconstrained_rows(robots, model, some, acting, *asked, terms)
         found = inverse_rows.solve_inverse_rows(
-            robots, method, options, some, acting, reference.copy(), stability, report, terms, swivels
+            robots, method, options, some, acting, reference.copy(), proves, report, terms, swivels
         )
         inverse_rows.decide_rows(terms, options, some, acting, found, report)
         return found, some
@@ -160,6 +165,8 @@ def inverse(
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
     state = _state_of(robots, placed, model, pose, load, found, direction)
     if stability:
+        if on_platform(robots).any():
+            found.pose_status[found.pose_status == codes.POSE_SOLVED] = codes.UNPROVED_STABILITY
         inverse_rows.decide_stability(placed, (model.code, *model.parameters), rows, found)
     plan = _plan_of(state, path, tension, found, anchors)
     return plan if winding is None or turning is not None else _with_path_friction(plan)

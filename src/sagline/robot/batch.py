@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sagline.cables.cable import Cable
 from sagline.core.arguments import brief, listed
-from sagline.core.arrays import Array, locked
+from sagline.core.arrays import Array, Flags, locked
 from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -82,26 +82,43 @@ def winches_of(robot: Robots) -> list[Winch]:
 
 
 def has_routing(robot: Robots) -> bool:
-    """True if any cable of the robot or robots runs over a pulley or has a dead length."""
+    """True if any cable of the robot or robots runs over a pulley, has a dead length or a winch on the platform."""
     return any(winches.anything_behind for winches in winches_of(robot))
 
 
 def has_slanted_axes(robot: Robots) -> bool:
-    """True if any pulley of the robot or robots swivels about an axis that is not vertical."""
+    """True if any pulley of the robot or robots is on the platform or swivels about an axis that is not vertical."""
     return any(winches.slanted.any() for winches in winches_of(robot))
 
 
-def refuse_slanted(robot: Robots) -> None:
-    """Refuse a robot with a swivel axis that is not vertical."""
+def refuse_slanted(robot: Robots, *, only_platform: bool = False) -> None:
+    """Refuse a robot with a swivel axis that is not vertical, unless `only_platform`, or a winch on the platform."""
     for winches in winches_of(robot):
-        if winches.slanted.any():
-            cable = int(np.argmax(winches.slanted))
+        refused = winches.on_platform if only_platform else winches.slanted
+        if refused.any():
+            cable = int(np.argmax(refused))
+            if winches.on_platform[cable]:
+                step = "On the platform: use inverse, forward, confirm, stiffness or modes, without friction."
+                raise InvalidValueError(f"winches: on_platform[{cable}]", "true", "false here", step)
             shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
             step = (
                 "Other axes: use inverse, forward, confirm, stiffness, modes, calibrate or simulate (massless cables), "
                 "without friction; or workspace, with fewer cables than freedoms."
             )
             raise InvalidValueError(f"winches: swivel_axis[{cable}]", f"({shown})", "up or down here", step)
+
+
+def on_platform(robot: Robots) -> Flags:
+    """True for each cable whose winch is on the platform, (m,) or (N, m)."""
+
+    def own(one: Robot) -> tuple[Array, ...]:
+        aboard = np.zeros(one.cable_count)
+        if one.winches is not None:
+            aboard[:] = one.winches.on_platform
+        return (aboard,)
+
+    aboard: Flags = _each(robot, own)[0] > 0.0
+    return aboard
 
 
 def robot_fields(robot: Robots, *names: str) -> tuple[Array, ...]:
@@ -188,3 +205,17 @@ def dead_cable(robot: Robots, name: Literal["dead_cable", "dead_rise"] = "dead_c
     if not isinstance(robot, Robot):
         return np.stack([dead_cable(one, name) for one in robot])
     return np.zeros(robot.cable_count) if robot.winches is None else np.asarray(getattr(robot.winches, name))
+
+
+def drum_heights(robot: Robots, pose: Pose) -> Array:
+    """Heights of the drums [m], (..., m); a drum on the platform is on the swivel axis of its pulley."""
+
+    def own(one: Robot) -> tuple[Array, ...]:
+        frame, ends, winches = one.frame_anchors[:, 2], one.platform_anchors, one.winches
+        if winches is None:
+            return frame, ends
+        return frame - winches.dead_rise, ends - winches.dead_cable[:, None] * winches.swivel_axis
+
+    at_frame, aboard = _each(robot, own)
+    turned = (aboard @ pose.matrix[..., 2, :, None])[..., 0]
+    return np.where(on_platform(robot), pose.position[..., 2, None] + turned, at_frame)

@@ -14,7 +14,7 @@ from sagline.core.arrays import Array, checked, kernel_input, locked, refuse_fir
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable import drum
 from sagline.kernels.codes import CATENARY
-from sagline.robot.batch import cables_of, dead_cable, robot_fields
+from sagline.robot.batch import cables_of, drum_heights, on_platform
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.routing import actual_routing, differs, tension_after
@@ -216,12 +216,13 @@ def drum_tension(state: Equilibrium) -> Array:
         return locked(actual_routing(state)[-1])
     if cables.model.code != CATENARY:
         return state.chord_tension
-    (anchors,) = robot_fields(robot, "frame_anchors")
-    fall = state.exit_point[..., 2] - anchors[..., 2] + dead_cable(robot, "dead_rise")
+    fall = state.exit_point[..., 2] - drum_heights(robot, state.pose)
+    # a cable leaves its pulley at its frame end, or at its platform end if the pulley is there
+    tension = np.where(on_platform(robot), cables.platform_end_tension, cables.frame_end_tension)
     material = cables_of(robot)
     stiffness = material.axial_stiffness
     drop = 2.0 * material.linear_density * cables.gravity * fall / stiffness
-    return locked(tension_after(cables.frame_end_tension, drop, stiffness))
+    return locked(tension_after(tension, drop, stiffness))
 
 
 def warmth(robot: Robot, temperature: Any) -> Array | float:

@@ -118,11 +118,11 @@ class Equilibrium(Result, Tabular):
             (anchors,) = batch.robot_fields(self.robot, "frame_anchors")
             return locked(np.array(np.broadcast_to(anchors, (*self.cables.shape, 3))))
         if self.contact.azimuth is not None:
-            (ends,) = batch.robot_fields(self.robot, "platform_anchors")
+            frame, ends = batch.robot_fields(self.robot, "frame_anchors", "platform_anchors")
             ends = self.pose.position[..., None, :] + ends @ np.swapaxes(self.pose.matrix, -1, -2)
             span, azimuth = self.cables.span, self.contact.azimuth
             chord = np.stack((span * np.cos(azimuth), span * np.sin(azimuth), self.cables.rise), axis=-1)
-            return locked(ends - chord)
+            return locked(np.where(batch.on_platform(self.robot)[..., None], frame + chord, ends - chord))
         return locked(batch.points_on_pulleys(self.robot, self.pose, self.contact.wrap_angle))
 
     @property

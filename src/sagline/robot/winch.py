@@ -29,7 +29,7 @@ class Winch:
     """One winch with its pulley, or the winches of all cables. All known fields have the same shape, () or (m,).
 
     A field that is None is unknown. A function that needs an unknown field raises an error with the name of the field.
-    The model does not include cables that run over a pulley on the platform and back to the frame.
+    The model does not include cables that run from the frame over a pulley on the platform and back to the frame.
 
     Attributes:
         pulley_radius: Radius of the pulley at the frame, measured to the centerline of the cable [m], 0 to 10; 0 for an
@@ -39,6 +39,11 @@ class Winch:
             (0, 0, 1) for a drum below the pulley, down (0, 0, -1), or any other direction. With another direction,
             `inverse`, `forward`, `confirm`, `stiffness` and `modes` compute the robot, with the models `Catenary` and
             `Elastic` and without friction; functions that do not support it refuse it.
+        on_platform: True if winch and pulley are on the platform. The cable then enters the pulley at the platform
+            anchor and ends at the frame anchor; the swivel axis is in the platform frame. The dead length is on the
+            swivel axis; guides and dead_rise are not allowed. Mass, center of mass and inertia of the robot include
+            winches, pulleys and the whole cable, as if all of it were on the drum. `inverse`, `forward`, `confirm`,
+            `stiffness` and `modes` compute the robot; other functions refuse it.
         pulley_friction: Friction coefficient mu of the cable on the pulley and at the guides. The tensions on the two
             sides of a bend of angle psi differ by the factor exp(mu psi). The tension is larger on the side toward
             which the cable moves. Friction is included only if the argument `winding` of a function, such as `inverse`
@@ -103,6 +108,7 @@ class Winch:
 
     pulley_radius: Array = field(default=0.0, converter=given, metadata=rule("m", low=0.0))
     swivel_axis: Array = field(default=(0.0, 0.0, 1.0), kw_only=True, converter=given, metadata=rule(shape=(3,)))
+    on_platform: Flags = field(default=False, kw_only=True, converter=given, metadata=rule())
     pulley_friction: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule(low=0.0))
     rolling_friction: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule(low=0.0))
     dead_cable: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("m", low=0.0))
@@ -152,13 +158,13 @@ class Winch:
 
     @property
     def anything_behind(self) -> bool:
-        """True if any cable has a pulley or a dead length; the dead length of guides is known only in a robot."""
-        return bool(self.pulley_radius.any() or self.dead_cable.any())
+        """True if any winch has a pulley, a dead length (of guides: known in a robot), or is on the platform."""
+        return bool(self.pulley_radius.any() or self.dead_cable.any() or self.on_platform.any())
 
     @property
     def slanted(self) -> Flags:
-        """True for each pulley whose swivel axis is not vertical; False for an eyelet, whose axis has no effect."""
-        return np.asarray(self.swivel_axis[..., :2].any(axis=-1) & (self.pulley_radius > 0.0))
+        """True for a pulley whose swivel axis is not vertical, and on the platform; an eyelet's axis has no effect."""
+        return np.asarray((self.swivel_axis[..., :2].any(axis=-1) & (self.pulley_radius > 0.0)) | self.on_platform)
 
     def per_cable(self, count: int) -> Winch:
         """Copy of the winch data for `count` cables, with one value per cable in every field.
@@ -186,10 +192,11 @@ class Winch:
 
     def _long(self) -> str:
         """Part of a message: names of the fields whose values differ between cables, or are slanted axes."""
+        general = "on_platform" if self.on_platform.any() else "swivel_axis"
         differ = [
             name
             for name, field in self.known().items()
-            if (field != field[0]).any() or (name == "swivel_axis" and self.slanted.any())
+            if (field != field[0]).any() or (name == general and self.slanted.any())
         ]
         if not differ:
             return "winches"
@@ -267,6 +274,9 @@ def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
             return _axes_of(array)
         case "guides":
             return _points(array)
+        case "on_platform":
+            refuse_first(~np.isin(array, (0.0, 1.0)), item, array, "", "true or false", "Say where the winch is.")
+            return locked(array.astype(np.bool_))
         case "layers":
             step = "Give the number of layers on the drum."
             refuse_first(array != np.floor(array), item, array, "", "whole numbers", step)
@@ -328,6 +338,12 @@ def _check_pairs(winch: Winch) -> None:
     refuse_first(steep, "winches: dead_rise", dead_rise, "m", allowed, step, dead_cable)
     step = "A bearing takes only part of the tension; correct it."
     refuse_first(friction >= 1.0, "winches: rolling_friction", friction, "", ">= 0, < 1", step)
+    if winch.on_platform.any():
+        cable, step = int(np.argmax(winch.on_platform)), "Its cable runs along the swivel axis; leave this out."
+        if winch.guides is not None:
+            raise InvalidValueError(f"winches: on_platform[{cable}]", "true", "false with guides", step)
+        turned = (dead_rise != 0.0) & winch.on_platform
+        refuse_first(turned, "winches: dead_rise", dead_rise, "m", "0 m on the platform", step)
     if winch.cable_length is not None:
         short, allowed = winch.cable_length < dead_cable, ">= {limit:g} m, its dead_cable"
         step = "The cable must be longer than the distance from drum to pulley; correct one of the two values."

@@ -12,7 +12,7 @@ from sagline.kernels import tables
 from sagline.kernels.cable import swivel
 from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for
-from sagline.robot.batch import has_routing, outward
+from sagline.robot.batch import has_routing, outward, refuse_slanted
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import kernel_length
 from sagline.statics.tables import pose_rows, robot_terms
@@ -86,8 +86,17 @@ class KernelStates(NamedTuple):
         return self
 
 
+def stiffness_and_levers(state: Equilibrium) -> tuple[Array, Array]:
+    """Derivative (..., 6, 6) of the unbalance by platform motion, and `CableSlopes.levers`."""
+    matrix, _, _, levers, *_ = KernelStates.of(state).describe().found
+    shape = state.pose.shape
+    return matrix.reshape(*shape, 6, 6), levers.reshape(*shape, *levers.shape[1:])
+
+
 def cable_slopes(state: Equilibrium) -> CableSlopes:
     """Derivatives of the cable forces by platform motion, by cable length and by cable data."""
+    # with the pulley on the platform, a force at the platform end is not the whole effect of a cable
+    refuse_slanted(state.robot, only_platform=True)
     matrix, stiffness, slopes, levers, force, tensions = (
         array.reshape(*state.pose.shape, *array.shape[1:]) for array in KernelStates.of(state).describe().found
     )

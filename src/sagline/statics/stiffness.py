@@ -16,7 +16,7 @@ from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import first_of, robot_fields
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
-from sagline.statics.slopes import KernelStates, cable_slopes
+from sagline.statics.slopes import KernelStates, stiffness_and_levers
 from sagline.statics.strings import strings_below, strings_of
 
 # A squared frequency counts as zero if it is smaller than this share of the largest.
@@ -186,7 +186,7 @@ def modes(state: Equilibrium) -> Modes:
     """
     _check_state(state, _MODES_BYTES)
     freedom = first_of(state.robot).freedom
-    matrix = freedom @ cable_slopes(state).matrix @ freedom.T
+    matrix = freedom @ stiffness_and_levers(state)[0] @ freedom.T
     lower = np.linalg.cholesky(freedom @ mass_matrix(state) @ freedom.T)
     inverse = np.linalg.inv(lower)
     scaled = inverse @ (0.5 * (matrix + np.swapaxes(matrix, -1, -2))) @ np.swapaxes(inverse, -1, -2)
@@ -201,11 +201,11 @@ def smallest_stiffness(state: Equilibrium) -> Array:
     """Smallest stiffness of the platform against its free motions [N/m], shape (...,); NaN without a solution."""
     # The size of a rotation is its arc at the root mean square distance of the platform ends from the center of mass.
     _check_state(state, _MODES_BYTES)
-    slopes, freedom = cable_slopes(state), first_of(state.robot).freedom
-    radius = np.sqrt((slopes.levers**2).sum(axis=-1).mean(axis=-1))[..., None]
+    (whole, levers), freedom = stiffness_and_levers(state), first_of(state.robot).freedom
+    radius = np.sqrt((levers**2).sum(axis=-1).mean(axis=-1))[..., None]
     turning = np.abs(freedom[:, 3:]).max(axis=1) > 0.0
     unit = np.where(turning & (radius > 0.0), 1.0 / np.where(radius > 0.0, radius, 1.0), 1.0)
-    matrix = unit[..., :, None] * (freedom @ slopes.matrix @ freedom.T) * unit[..., None, :]
+    matrix = unit[..., :, None] * (freedom @ whole @ freedom.T) * unit[..., None, :]
     absent = np.asarray(np.isnan(matrix).any(axis=(-1, -2)))
     symmetric = 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
     values = np.linalg.eigvalsh(np.where(absent[..., None, None], 0.0, symmetric))[..., 0]

@@ -11,15 +11,15 @@ from sagline.kernels import codes
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
 from sagline.kernels.tables import FRAME_X, FRAME_Z, SHORTEST_CHORD
-from sagline.robot.batch import Robots, first_of, has_slanted_axes, pulleys_of, refuse_slanted
+from sagline.robot.batch import Robots, first_of, has_slanted_axes, on_platform, pulleys_of, refuse_slanted
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 
 def cable_table(robot: Robots, slanted: bool = False) -> Array:
     """Table (1 or N, m, CABLE_COLUMNS) with anchors, material and limits; columns of `sagline.kernels.tables`."""
-    # slanted: True if the caller supports swivel axes that are not vertical; the table of a robot with such an axis has
-    # SWIVEL_COLUMNS columns. Robots with such axes are refused otherwise.
+    # slanted: True if the caller supports swivel axes that are not vertical and winches on the platform; the table of
+    # such a robot has SWIVEL_COLUMNS columns. It is refused otherwise.
     if slanted and has_slanted_axes(robot):
         return locked(np.array([slanted_rows(one) for one in ((robot,) if isinstance(robot, Robot) else robot)]))
     refuse_slanted(robot)
@@ -28,9 +28,9 @@ def cable_table(robot: Robots, slanted: bool = False) -> Array:
 
 
 def check_slanted(robot: Robots, model: CableModel) -> None:
-    """Refuse cable models other than the exact and the weightless one with swivel axes that are not vertical."""
+    """Refuse cable models other than the exact and the weightless one with pulleys of `has_slanted_axes`."""
     if model.code not in (codes.CATENARY, codes.ELASTIC) and has_slanted_axes(robot):
-        step = "Use the default model; the others have vertical swivel axes only."
+        step = "Use the default model; the others have vertical swivel axes at the frame only."
         raise InvalidValueError("model", type(model).__name__, "Catenary or Elastic for such swivel axes", step)
 
 
@@ -42,6 +42,7 @@ def slanted_rows(robot: Robot) -> Array:
     else:
         radius, axes = winches.pulley_radius, winches.swivel_axis
         entry = np.where(winches.slanted, np.nan, np.where(axes[:, 2] < 0.0, -1.0, 1.0))
+        entry[winches.on_platform] = 0.0
     return np.hstack((_cable_rows(robot, (radius, entry)), axes))
 
 
@@ -118,7 +119,8 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
     radius = 0.0 if one.winches is None else float(one.winches.pulley_radius[cable])
     if has_slanted_axes(one):
         value, step = "inside its pulley or on its near side", "Move the platform away, or correct the pulley."
-        raise CableGeometryError(f"{item}: its platform end", value, f"outside, radius {radius:g} m", step)
+        end = "frame" if on_platform(one)[cable] else "platform"
+        raise CableGeometryError(f"{item}: its {end} end", value, f"outside, radius {radius:g} m", step)
     if radius > 0.0:
         raise _inside_pulley(item, one, here, cable, radius)
     raise CableGeometryError(

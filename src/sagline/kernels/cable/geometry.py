@@ -15,7 +15,8 @@ from sagline.kernels.jit import entry, formula, kernel
 SPAN, RISE, CHORD, SINE, COSINE = 0, 1, 2, 3, 4  # x_B, z_B, D, sin phi, cos phi of the chord
 AZIMUTH_X, AZIMUTH_Y = 5, 6  # horizontal unit vector from frame end to platform end: cos theta, sin theta
 LEVER_X, LEVER_Y, LEVER_Z = 7, 8, 9  # r, from the center of mass to the platform end, world axes
-GEOMETRY_ROWS = 10
+AXIS_X, AXIS_Y, AXIS_Z, DRUM_RISE = 10, 11, 12, 13  # swivel axis of any direction, world axes; rise of the anchor [m]
+GEOMETRY_ROWS = 14
 
 
 @formula
@@ -51,15 +52,28 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
 
 
 @kernel
-def _tangent_about(cables: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Vector from the pulley of cable `i` along the tangent to the point (`x`, `y`, `z`) relative to the frame anchor.
+def _tangent_about(
+    cables: Array, rotation: Array, geometry: Array, i: int, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Vector from the pulley of cable `i` along the tangent to the other end of the cable. Fills axis and rise.
 
-    NaN if no tangent exists. The pulley swivels about the axis of the table, and is in the plane of axis and point.
+    NaN if no tangent exists. The pulley swivels about the axis of the table, and is in the plane of axis and other end.
+    (`x`, `y`, `z`) is the platform anchor relative to the frame anchor. One of them is the anchor of the pulley.
     """
+    nx, ny, nz = cables[i, tables.AXIS_X], cables[i, tables.AXIS_Y], cables[i, tables.AXIS_Z]
+    geometry[DRUM_RISE, i] = cables[i, tables.DEAD_RISE]
+    if cables[i, tables.ENTRY] == 0.0:
+        x, y, z = -x, -y, -z
+        nx, ny, nz = (
+            rotation[0, 0] * nx + rotation[0, 1] * ny + rotation[0, 2] * nz,
+            rotation[1, 0] * nx + rotation[1, 1] * ny + rotation[1, 2] * nz,
+            rotation[2, 0] * nx + rotation[2, 1] * ny + rotation[2, 2] * nz,
+        )
+        geometry[DRUM_RISE, i] = cables[i, tables.DEAD_CABLE] * nz
+    geometry[AXIS_X, i], geometry[AXIS_Y, i], geometry[AXIS_Z, i] = nx, ny, nz
     radius = cables[i, tables.PULLEY_RADIUS]
     if radius == 0.0:
         return x, y, z
-    nx, ny, nz = cables[i, tables.AXIS_X], cables[i, tables.AXIS_Y], cables[i, tables.AXIS_Z]
     along = x * nx + y * ny + z * nz
     rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
     across = math.sqrt(rx * rx + ry * ry + rz * rz)
@@ -84,7 +98,7 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
         geometry[AZIMUTH_X, i] = dx / span if span > 0.0 else 1.0
         geometry[AZIMUTH_Y, i] = dy / span if span > 0.0 else 0.0
         if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-            dx, dy, dz = _tangent_about(cables, i, dx, dy, dz)
+            dx, dy, dz = _tangent_about(cables, rotation, geometry, i, dx, dy, dz)
             span = math.sqrt(dx * dx + dy * dy)
             chord = math.sqrt(span * span + dz * dz)
             sine, cosine = dz / chord, span / chord

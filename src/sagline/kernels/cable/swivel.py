@@ -89,19 +89,24 @@ class Exit(NamedTuple):
 
 
 @formula
+def _swivel_about(cables: Array, i: int, gravity: float, x: float, y: float, z: float, rise: float) -> Swivel:
+    """Pulley and material of cable `i` of a cable_table, with the swivel axis (`x`, `y`, `z`)."""
+    pulley, weight = pulley_at(cables, i), cables[i, tables.DENSITY] * gravity
+    return Swivel(x, y, z, pulley.radius, pulley.dead, rise, weight, cables[i, tables.STIFFNESS])
+
+
+@formula
 def swivel_at(cables: Array, i: int, gravity: float) -> Swivel:
-    """Swivel axis, pulley and material of cable `i` of a cable_table with swivel axes."""
-    pulley = pulley_at(cables, i)
-    return Swivel(
-        cables[i, tables.AXIS_X],
-        cables[i, tables.AXIS_Y],
-        cables[i, tables.AXIS_Z],
-        pulley.radius,
-        pulley.dead,
-        pulley.rise,
-        cables[i, tables.DENSITY] * gravity,
-        cables[i, tables.STIFFNESS],
-    )
+    """Swivel axis, pulley and material of cable `i` of a cable_table with swivel axes; for a pulley at the frame."""
+    x, y, z = cables[i, tables.AXIS_X], cables[i, tables.AXIS_Y], cables[i, tables.AXIS_Z]
+    return _swivel_about(cables, i, gravity, x, y, z, cables[i, tables.DEAD_RISE])
+
+
+@formula
+def swivel_in(rows: Array, cables: Array, i: int, gravity: float) -> Swivel:
+    """`swivel_at` after `cable_geometry`, also for a pulley on the platform."""
+    x, y, z = rows[g.AXIS_X, i], rows[g.AXIS_Y, i], rows[g.AXIS_Z, i]
+    return _swivel_about(cables, i, gravity, x, y, z, rows[g.DRUM_RISE, i])
 
 
 @formula
@@ -165,6 +170,16 @@ def _point_of(swivel: Swivel, at: Exit) -> Vector:
     """Position of the exit point relative to the anchor [m]."""
     v, along = swivel.radius * (1.0 - at.cosine), swivel.radius * at.sine
     return v * at.rx + along * swivel.x, v * at.ry + along * swivel.y, v * at.rz + along * swivel.z
+
+
+@formula
+def exit_in(rows: Array, cables: Array, i: int) -> Vector:
+    """Position of the exit point relative to the anchor [m], after `solve_swivels`."""
+    out, along = 1.0 - rows[g.WRAP_COSINE, i], rows[g.WRAP_SINE, i]
+    x = out * rows[g.CENTER_X, i] + along * rows[g.AXIS_X, i]
+    y = out * rows[g.CENTER_Y, i] + along * rows[g.AXIS_Y, i]
+    z = out * rows[g.CENTER_Z, i] + along * rows[g.AXIS_Z, i]
+    return cables[i, tables.PULLEY_RADIUS] * x, cables[i, tables.PULLEY_RADIUS] * y, cables[i, tables.PULLEY_RADIUS] * z
 
 
 @formula
@@ -488,24 +503,24 @@ def solve_swivels(model: Model, cables: Array, rows: Array) -> None:
     # Cables for which the passes do not converge are solved one by one, by damped Newton steps.
     m, gravity = cables.shape[0], model.gravity if model.code == codes.CATENARY else 0.0
     for i in independent(m):
-        _fill_tangent(swivel_at(cables, i, gravity), rows, i)
+        _fill_tangent(swivel_in(rows, cables, i, gravity), rows, i)
     for _ in range(PASSES if gravity > 0.0 else 0):
         for i in independent(m):
-            _fill_equivalent_force(swivel_at(cables, i, gravity), rows, i)
+            _fill_equivalent_force(swivel_in(rows, cables, i, gravity), rows, i)
         for i in range(m):
             if math.isnan(rows[g.PARAMETER, i]):
-                _fill_any_equivalent_force(swivel_at(cables, i, gravity), rows, i)
+                _fill_any_equivalent_force(swivel_in(rows, cables, i, gravity), rows, i)
         for i in independent(m):
-            swivel = swivel_at(cables, i, gravity)
+            swivel = swivel_in(rows, cables, i, gravity)
             at = _exit_of(swivel, rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
             _store(at, rows[g.LENGTH, i] - (at.wrapped + at.dead), rows, i)
         for i in independent(m):
-            _fill_series(swivel_at(cables, i, gravity), rows, i)
+            _fill_series(swivel_in(rows, cables, i, gravity), rows, i)
         for i in range(m):
             if math.isnan(rows[g.SERIES, i]):
-                _fill_any_series(swivel_at(cables, i, gravity), rows, i)
+                _fill_any_series(swivel_in(rows, cables, i, gravity), rows, i)
         for i in independent(m):
-            _correct(swivel_at(cables, i, gravity), rows, i)
+            _correct(swivel_in(rows, cables, i, gravity), rows, i)
         left = 0.0
         for i in range(m):
             left = max(left, rows[g.LEFT, i])
@@ -515,19 +530,21 @@ def solve_swivels(model: Model, cables: Array, rows: Array) -> None:
         if not rows[g.LEFT, i] <= MISSED:
             _solve_by_newton(model, cables, rows, i)
     for i in independent(m):
-        _fill_chord(swivel_at(cables, i, gravity), rows, i)
+        _fill_chord(swivel_in(rows, cables, i, gravity), rows, i)
 
 
 @glue
 def fill_from_results(model: Model, cables: Array, results: Array, p: int, rows: Array) -> None:
     """Fill lengths, forces and exits of all cables at pose `p` of a plan, after `cable_geometry`."""
     for i in range(cables.shape[0]):
-        swivel = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+        swivel = swivel_in(rows, cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
         azimuth, horizontal = results[tables.AZIMUTH, p, i], results[tables.HORIZONTAL, p, i]
         cosine, sine, z = math.cos(azimuth), math.sin(azimuth), results[tables.VERTICAL, p, i]
-        x, y = horizontal * cosine, horizontal * sine
         rows[g.LENGTH, i] = results[tables.LENGTH, p, i]
         free = rows[g.LENGTH, i] - (results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i])
+        if cables[i, tables.ENTRY] == 0.0:  # the rows are from the pulley on the platform to the frame anchor
+            cosine, sine, z = -cosine, -sine, swivel.weight * free - z
+        x, y = horizontal * cosine, horizontal * sine
         down = z - swivel.weight * free
         _store(_exit_of(swivel, x, y, down), free, rows, i)
         rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] = x, y, z
@@ -558,7 +575,7 @@ def _fill_tangent(swivel: Swivel, rows: Array, i: int) -> None:
 def _solve_by_newton(model: Model, cables: Array, rows: Array, i: int) -> None:
     """Fill force and exit of cable `i` by damped Newton steps from the straight cable, and its status."""
     gravity = model.gravity if model.code == codes.CATENARY else 0.0
-    swivel = swivel_at(cables, i, gravity)
+    swivel = swivel_in(rows, cables, i, gravity)
     length, behind, end = (
         rows[g.LENGTH, i],
         rows[g.TO_DRUM, i],
@@ -664,7 +681,7 @@ def _fill_chord(swivel: Swivel, rows: Array, i: int) -> None:
 def stiffness_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> None:
     """Fill stiffness and dT/dL of cable `i` in world axes, after `solve_swivel`. Zero for a cable without force."""
     if rows[g.LEAVING, i] > 0.0:
-        swivel = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+        swivel = swivel_in(rows, cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
         force = (rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
         _fill_stiffness(swivel, _stored(swivel, rows, i), force, rows[g.FREE_LENGTH, i], rows, i)
     else:
@@ -673,60 +690,89 @@ def stiffness_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> Non
         rows[g.LONGER_X, i] = rows[g.LONGER_Y, i] = rows[g.LONGER_Z, i] = 0.0
 
 
+class _Terms(NamedTuple):
+    """Derivatives of a cable at a fixed force on the platform end, exit point and free length."""
+
+    right: Vector  # right sides of the equations
+    heavier: float  # of the weight w
+    end: Vector  # of the platform end
+    strain: float  # of the stretch at the exit point
+    entering: float  # half the derivative of the square of the stretch at the entry, at a constant stretch at the exit
+    drawn: float  # half the further derivative of the square of the stretch at the drum
+    moment: Vector  # of the first moment of the cable behind the exit point about the anchor, of `_first_moments`
+
+
+@formula
+def _terms_of_data(
+    s: Swivel, at: Exit, q: _Equations, k: int, cables: Array, i: int, force: Vector, free: float, turning: bool
+) -> _Terms:
+    """Derivatives by the data `k` of cable `i`. `turning`: True for a pulley on the platform."""
+    # force: force at the platform end [N]
+    w, soft, (x, y, end), none = s.weight, 1.0 / s.stiffness, force, (0.0, 0.0, 0.0)
+    e, v, sz, total = q.strained, 1.0 - at.cosine, at.sz, 1.0 / (q.entering + q.drawn)
+    beta, slip, late = w * s.radius * soft, (at.wrap - at.sine) / e, s.dead * total * total / q.drawn
+    if k == 0:
+        return _Terms((0.0, 0.0, 1.0), 0.0, none, 0.0, 0.0, 0.0, (s.dead * s.x, s.dead * s.y, s.dead * s.z))
+    if k == 1:  # a heavier cable also decreases the force at the exit point
+        gravity = w / cables[i, tables.DENSITY] if w > 0.0 else 0.0
+        one, two, three = _forces_on(s, at, q)[2]
+        part = q.integral * s.radius * soft / (e * e * e) - 2.0 * q.bends * soft * q.zeta
+        part = s.radius * part + 2.0 * late * soft * s.rise
+        a, b, c = -free * one, s.radius * slip * sz - free * two, -part - free * three
+        level = math.sqrt(x * x + y * y)
+        by_weight = catenary_by_weight(level, end, free, w, s.stiffness) if w > 0.0 else PlaneVector(0.0, 0.0)
+        share = gravity * by_weight.x / level if level > 0.0 else 0.0
+        moved = share * x, share * y, gravity * by_weight.z
+        right, entry = (gravity * a, gravity * b, gravity * c), -gravity * s.radius * soft * q.zeta
+        return _Terms(right, gravity, moved, 0.0, entry, -gravity * soft * s.rise, none)
+    if k == 2:
+        less = (e - 1.0) * soft  # minus the derivative of the stretch at the exit point
+        part = less * (at.wrap / (e * e) + 3.0 * beta * q.integral / (e * e * e * e))
+        part = s.radius * (part - beta * soft * q.integral / (e * e * e))
+        part += 2.0 * q.bends * (beta * soft * q.zeta - e * less) - 2.0 * late * w * s.rise * soft * soft
+        moved = -free * soft * soft * x, -free * soft * soft * y, -free * soft * soft * (end - 0.5 * w * free)
+        right, drum = (0.0, w * s.radius * slip * sz * less / e, -part), w * s.rise * soft * soft
+        return _Terms(right, 0.0, moved, -less, beta * soft * q.zeta, drum, none)
+    if k == 3:
+        c = -(at.wrap + 2.0 * beta * q.integral / (e * e)) / e + 2.0 * q.bends * w * soft * q.zeta
+        moved = v * at.rx + at.sine * s.x, v * at.ry + at.sine * s.y, v * at.rz + at.sine * s.z
+        own, along = 2.0 * s.radius * slip, 2.0 * s.radius * v / e
+        more = own * at.rx + along * s.x, own * at.ry + along * s.y, own * at.rz + along * s.z
+        return _Terms((0.0, w * slip * sz, c), 0.0, moved, 0.0, -w * soft * q.zeta, 0.0, more)
+    fall = w * soft * s.z if turning else 0.0  # the drum moves along the axis
+    along = 0.0
+    if turning:
+        along = free + at.wrapped + at.dead - 4.0 / 3.0 * s.dead * (2.0 * q.entering + q.drawn) * total * total
+    right = 0.0, 0.0, -2.0 * total - 2.0 * late * fall
+    return _Terms(right, 0.0, none, 0.0, 0.0, -fall, (along * s.x, along * s.y, along * s.z))
+
+
 @kernel
 def slopes_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: Array) -> None:
     """Fill `slopes` (SLOPES, 5) of cable `i`, after `stiffness_of_swivel`; zero for a cable without force."""
     # The first rows are derivatives by length, density, EA, pulley radius and dead length: of the force on the platform
     # end, which is at rest, and of the tension at the exit point [N] and the swivel angle [rad], at a fixed force on
-    # the platform end. The last three rows are derivatives of the tension and the angle by this force, world axes.
+    # the platform end. The last three rows are derivatives of the tension and the angle by this force, world axes. With
+    # the pulley on the platform, the platform end is the frame anchor.
     slopes[:] = 0.0
     if not rows[g.LEAVING, i] > 0.0:
         return
-    s = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
-    at, free, w, soft = _stored(s, rows, i), rows[g.FREE_LENGTH, i], s.weight, 1.0 / s.stiffness
-    x, y, end = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
-    q = _equations(s, at, x, y, end - w * free)
-    e, v, sz, total = q.strained, 1.0 - at.cosine, at.sz, 1.0 / (q.entering + q.drawn)
-    beta, slip, late = w * s.radius * soft, (at.wrap - at.sine) / e, s.dead * total * total / q.drawn
+    s = swivel_in(rows, cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+    at, free = _stored(s, rows, i), rows[g.FREE_LENGTH, i]
+    force = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
+    q = _equations(s, at, force[0], force[1], force[2] - s.weight * free)
     by_x, by_y, by_z = _forces_on(s, at, q)
-    one, two, three = by_z
-    gravity = w / cables[i, tables.DENSITY] if w > 0.0 else 0.0
     for k in range(SLOPES):
-        # right sides of the equations, and the motion of the end at a fixed exit point and free length
-        a, b, c, heavier, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        if k == 0:
-            c = 1.0
-        elif k == 1:  # a heavier cable also decreases the force at the exit point
-            heavier = gravity
-            part = q.integral * s.radius * soft / (e * e * e) - 2.0 * q.bends * soft * q.zeta
-            part = s.radius * part + 2.0 * late * soft * s.rise
-            a, b, c = -free * one, s.radius * slip * sz - free * two, -part - free * three
-            a, b, c = gravity * a, gravity * b, gravity * c
-            level = math.sqrt(x * x + y * y)
-            by_weight = catenary_by_weight(level, end, free, w, s.stiffness) if w > 0.0 else PlaneVector(0.0, 0.0)
-            share = gravity * by_weight.x / level if level > 0.0 else 0.0
-            dx, dy, dz = share * x, share * y, gravity * by_weight.z
-        elif k == 2:
-            less = (e - 1.0) * soft  # minus the derivative of the stretch at the exit point
-            part = less * (at.wrap / (e * e) + 3.0 * beta * q.integral / (e * e * e * e))
-            part = s.radius * (part - beta * soft * q.integral / (e * e * e))
-            part += 2.0 * q.bends * (beta * soft * q.zeta - e * less) - 2.0 * late * w * s.rise * soft * soft
-            b, c = w * s.radius * slip * sz * less / e, -part
-            dx, dy, dz = -free * soft * soft * x, -free * soft * soft * y, -free * soft * soft * (end - 0.5 * w * free)
-        elif k == 3:
-            b = w * slip * sz
-            c = -(at.wrap + 2.0 * beta * q.integral / (e * e)) / e + 2.0 * q.bends * w * soft * q.zeta
-            dx, dy, dz = v * at.rx + at.sine * s.x, v * at.ry + at.sine * s.y, v * at.rz + at.sine * s.z
-        elif k == 4:
-            c = -2.0 * total
-        elif k == 5:
-            a, b, c = by_x
-        elif k == 6:
-            a, b, c = by_y
-        else:
-            a, b, c = by_z
-        (ex, ey, ez), (_psi, sigma, grown) = _motion_by(s, at, q, (a, b, c))
-        slopes[k, 3], slopes[k, 4] = -q.uz * (w * grown + free * heavier), sigma
+        right, heavier, (dx, dy, dz) = by_z, 0.0, (0.0, 0.0, 0.0)
+        if k < DATA:
+            terms = _terms_of_data(s, at, q, k, cables, i, force, free, cables[i, tables.ENTRY] == 0.0)
+            right, heavier, (dx, dy, dz) = terms.right, terms.heavier, terms.end
+        elif k == DATA:
+            right = by_x
+        elif k == DATA + 1:
+            right = by_y
+        (ex, ey, ez), (_psi, sigma, grown) = _motion_by(s, at, q, right)
+        slopes[k, 3], slopes[k, 4] = -q.uz * (s.weight * grown + free * heavier), sigma
         if k < DATA:
             away = (-ex - dx, -ey - dy, -ez - dz)
             slopes[k, 0] = _product(rows, i, g.W_XX, g.W_XY, g.W_XZ, away)
@@ -737,10 +783,137 @@ def slopes_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: A
     slopes[7, 3] += q.uz
 
 
+@formula
+def _cross(a: Vector, b: Vector) -> Vector:
+    """The vector a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@formula
+def _first_moment(s: Swivel, at: Exit, strains: Vector, length: float) -> Vector:
+    """First moment [m^2] about the anchor of the cable behind the exit point, minus that of `length` at the drum."""
+    # strains: stretch at the exit point, at the entry of the pulley, and at the drum
+    strained, entering, drawn = strains
+    on, total = s.radius * s.radius / strained, entering + drawn
+    along = on * (1.0 - at.cosine) + s.dead * (length - 2.0 / 3.0 * s.dead * (entering + total) / (total * total))
+    return _combined(on * (at.wrap - at.sine), (at.rx, at.ry, at.rz), along, (s.x, s.y, s.z), 0.0, (s.x, s.y, s.z))
+
+
+@formula
+def first_moment_behind(s: Swivel, at: Exit, force: Vector, length: float) -> Vector:
+    """`_first_moment` at the `force` at the exit point [N]."""
+    tension = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    zeta, _integral = _height(s, at.rz, at.sine, at.cosine, at.wrap)
+    return _first_moment(s, at, _strains(s, tension, zeta), length)
+
+
+@kernel
+def moment_on_platform(model: Model, cables: Array, rows: Array, i: int) -> Vector:
+    """Moment [N m] about the anchor of a pulley on the platform: force at the exit point, and weights behind it."""
+    s = swivel_in(rows, cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+    at, (x, y, z) = _stored(s, rows, i), (rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i])
+    force = x, y, z - s.weight * rows[g.FREE_LENGTH, i]
+    turned, first = _cross(_point_of(s, at), force), first_moment_behind(s, at, force, rows[g.LENGTH, i])
+    return turned[0] - s.weight * first[1], turned[1] + s.weight * first[0], turned[2]
+
+
+@formula
+def _end_and_moment(
+    s: Swivel, at: Exit, q: _Equations, force: Vector, free: float, length: float, terms: _Terms
+) -> tuple[Vector, Vector]:
+    """Derivatives of the frame end relative to the anchor and of the moment about it, at a fixed force on this end."""
+    # A pulley on the platform; `force` is the force at the exit point. The motion of the end is without terms.end.
+    end, (psi, sigma, grown) = _motion_by(s, at, q, terms.right)
+    e, v, soft, total = q.strained, 1.0 - at.cosine, 1.0 / s.stiffness, q.entering + q.drawn
+    lighter = s.weight * grown + free * terms.heavier
+    strain = terms.strain - soft * q.uz * lighter
+    raised = (at.sine * at.rz + at.cosine * s.z) * psi + v * at.sz * sigma
+    entering = (e * strain - s.weight * s.radius * soft * raised + terms.entering) / q.entering
+    drawn = (q.entering * entering + terms.drawn) / q.drawn
+    on, slip = s.radius * s.radius / e, at.wrap - at.sine
+    along = on * (at.sine * psi - v * strain / e)
+    cubed = 2.0 / 3.0 * s.dead * s.dead / (total * total * total)
+    along += cubed * (2.0 * q.entering * entering + (3.0 * q.entering + q.drawn) * drawn)
+    outward, sideways = on * (v * psi - slip * strain / e), on * slip * sigma
+    first = _first_moment(s, at, (e, q.entering, q.drawn), length)
+    px, py, _pz = _point_of(s, at)
+    mx = s.weight * (outward * at.rx + sideways * at.sx + along * s.x + terms.moment[0])
+    my = s.weight * (outward * at.ry + sideways * at.sy + along * s.y + terms.moment[1])
+    mx, my = mx + terms.heavier * first[0] + lighter * px, my + terms.heavier * first[1] + lighter * py
+    grow = e * grown
+    tx, ty, tz = _cross((end[0] - grow * q.ux, end[1] - grow * q.uy, end[2] - grow * q.uz), force)
+    return end, (tx - my, ty + mx, tz)
+
+
+@formula
+def _terms_of_turn(s: Swivel, at: Exit, q: _Equations, force: Vector, length: float, axis: Vector) -> _Terms:
+    """Derivatives by a rotation of the platform about the unit vector `axis`, at a fixed frame end and anchor."""
+    w, soft, sine, v, (nx, ny, nz) = s.weight, 1.0 / s.stiffness, at.sine, 1.0 - at.cosine, (s.x, s.y, s.z)
+    beta, slip, cube = w * s.radius * soft, at.wrap - sine, q.strained * q.strained * q.strained
+    late = s.dead / (q.drawn * (q.entering + q.drawn) * (q.entering + q.drawn))
+    radial = at.cosine * at.rx - sine * nx, at.cosine * at.ry - sine * ny, at.cosine * at.rz - sine * nz
+    _rx, _ry, raised = _cross(axis, (at.rx, at.ry, at.rz))
+    _nx, _ny, lifted = _cross(axis, (nx, ny, nz))
+    cx, cy, cz = _cross(axis, radial)
+    sx, sy, sz = _cross(axis, (at.sx, at.sy, at.sz))
+    x, y, z = force
+    one = x * cx + y * cy + z * cz
+    two = w * s.radius * slip / q.strained * sz - v * (x * sx + y * sy + z * sz)
+    three = (s.radius * (at.wrap * v - slip) / cube - 2.0 * q.bends * v) * beta * raised
+    three += (s.radius * (at.wrap * sine - v) / cube - 2.0 * q.bends * sine) * beta * lifted
+    drum = -w * soft * s.dead * lifted
+    first = _cross(axis, _first_moment(s, at, (q.strained, q.entering, q.drawn), length))
+    entry = -beta * (v * raised + sine * lifted)
+    end = _cross(axis, _point_of(s, at))
+    return _Terms((one, two, 2.0 * late * drum - three), 0.0, end, 0.0, entry, drum, first)
+
+
+@kernel
+def turn_of_swivel(model: Model, cables: Array, rows: Array, i: int, axis: Vector) -> tuple[Vector, Vector]:
+    """`_end_and_moment` of cable `i` by a rotation of the platform about `axis`, with its pulley on the platform."""
+    s = swivel_in(rows, cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+    at, free, length = _stored(s, rows, i), rows[g.FREE_LENGTH, i], rows[g.LENGTH, i]
+    force = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] - s.weight * free
+    q = _equations(s, at, force[0], force[1], force[2])
+    terms = _terms_of_turn(s, at, q, force, length, axis)
+    end, moment = _end_and_moment(s, at, q, force, free, length, terms)
+    direct = _cross(terms.end, force)
+    return (
+        (end[0] + terms.end[0], end[1] + terms.end[1], end[2] + terms.end[2]),
+        (moment[0] + direct[0], moment[1] + direct[1], moment[2] + direct[2]),
+    )
+
+
+@kernel
+def moments_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: Array) -> None:
+    """Fill `slopes` (DATA + 3, 3) of cable `i` with its pulley on the platform; zero for a cable without force."""
+    # Derivatives of the moment about the anchor by the data, and of the frame end relative to the anchor by rotations
+    # of the platform, at a fixed force on the frame end.
+    slopes[:] = 0.0
+    if not rows[g.LEAVING, i] > 0.0:
+        return
+    s = swivel_in(rows, cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+    at, free, length = _stored(s, rows, i), rows[g.FREE_LENGTH, i], rows[g.LENGTH, i]
+    x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
+    force = x, y, z - s.weight * free
+    q = _equations(s, at, force[0], force[1], force[2])
+    for k in range(DATA):
+        terms = _terms_of_data(s, at, q, k, cables, i, (x, y, z), free, True)
+        _end, (mx, my, mz) = _end_and_moment(s, at, q, force, free, length, terms)
+        if k == 3:  # the exit point moves with the radius
+            direct = _cross(terms.end, force)
+            mx, my, mz = mx + direct[0], my + direct[1], mz + direct[2]
+        slopes[k, 0], slopes[k, 1], slopes[k, 2] = mx, my, mz
+    for k in range(3):
+        axis = 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
+        end, _moment = turn_of_swivel(model, cables, rows, i, axis)
+        slopes[DATA + k, 0], slopes[DATA + k, 1], slopes[DATA + k, 2] = end
+
+
 @kernel
 def energy_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> float:
     """Energy [J] of the cable between exit point and drum, plus energy to lift the free span to the exit point."""
-    swivel = swivel_at(cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
+    swivel = swivel_in(rows, cables, i, model.gravity if model.code == codes.CATENARY else 0.0)
     free, radius = rows[g.FREE_LENGTH, i], swivel.radius
     x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i] - swivel.weight * free
     tension = math.sqrt(x * x + y * y + z * z)
@@ -759,6 +932,7 @@ def energy_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> float:
         + radius * (tension * at.wrap - swivel.weight * radius * integral / strained)
         + swivel.stiffness * swivel.dead * on_run / (3.0 * (2.0 + total))
         - whole * (at.wrapped + at.dead)
+        + (swivel.weight * rows[g.LENGTH, i] * swivel.rise if cables[i, tables.ENTRY] == 0.0 else 0.0)
     )
 
 
@@ -792,7 +966,8 @@ def exits_of_forces(robots: Array, gravity: Array, forces: Array, eyelets: Array
     # eyelets: Present exit points in world axes [m], (N, m, 3).
     # chords: Lengths of the chords of the free spans [m], (N, m).
     # exits: Filled with the next exit points in world axes [m], the wrap angle [rad], the unstrained length on the
-    #   pulley and the unstrained dead length [m], (N, m, 6).
+    #   pulley and the unstrained dead length [m], (N, m, 6). In further columns, the level components of the first
+    #   moment about the anchor of the cable behind the exit point [m^2], (N, m, 8).
     for p in range(forces.shape[0]):
         cables = robots[min(p, robots.shape[0] - 1)]
         for i in range(cables.shape[0]):
@@ -801,3 +976,5 @@ def exits_of_forces(robots: Array, gravity: Array, forces: Array, eyelets: Array
             (x, y, z), at = next_exit(swivel, cables, i, force, eyelets[p], chords[p, i])
             exits[p, i, 0], exits[p, i, 1], exits[p, i, 2] = x, y, z
             exits[p, i, 3], exits[p, i, 4], exits[p, i, 5] = at.wrap, at.wrapped, at.dead
+            if exits.shape[2] > 6:
+                exits[p, i, 6], exits[p, i, 7], _z = first_moment_behind(swivel, at, force, 0.0)

@@ -126,6 +126,13 @@ def _store_sample(problem: f.PoseProblem, rows: Array, p: int, results: Array, s
             results[tables.SINE, p, i] = rows[g.SINE, i]
             if results.shape[0] > tables.RESULT_ROWS:
                 results[tables.AZIMUTH, p, i] = math.atan2(rows[g.AZIMUTH_Y, i], rows[g.AZIMUTH_X, i])
+            if f.is_on_platform(problem.cables, i):  # from the frame anchor to the exit point
+                results[tables.RISE, p, i] = -rows[g.FREE_RISE, i]
+                weight = problem.cables[i, tables.DENSITY] * problem.model.gravity * rows[g.FREE_LENGTH, i]
+                weight = weight if problem.model.code == codes.CATENARY else 0.0
+                results[tables.VERTICAL, p, i] = weight - rows[g.VERTICAL, i]
+                results[tables.SINE, p, i] = -rows[g.SINE, i]
+                results[tables.AZIMUTH, p, i] = math.atan2(-rows[g.AZIMUTH_Y, i], -rows[g.AZIMUTH_X, i])
 
 
 @entry

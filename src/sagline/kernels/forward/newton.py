@@ -14,6 +14,7 @@ from sagline.kernels.algebra.factors import copy, dot, factor_positive, norm, so
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import end_motion_per_length
 from sagline.kernels.cable.stiffness import force_by_length, force_change, force_of, plane_of
+from sagline.kernels.cable.swivel import exit_in
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.jit import glue, kernel
@@ -70,8 +71,14 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
         if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
             wound = lengths[i] - length
-            change = (wound * rows[g.LONGER_X, i], wound * rows[g.LONGER_Y, i], wound * rows[g.LONGER_Z, i])
-            f.add_world_force(rows, i, change, wrench)
+            wound = -wound if f.is_on_platform(cables, i) else wound
+            x, y, z = wound * rows[g.LONGER_X, i], wound * rows[g.LONGER_Y, i], wound * rows[g.LONGER_Z, i]
+            f.add_world_force(rows, i, (x, y, z), wrench)
+            if f.is_on_platform(cables, i):  # almost the whole moment
+                px, py, pz = exit_in(rows, cables, i)
+                wrench[3] += py * z - pz * y
+                wrench[4] += pz * x - px * z
+                wrench[5] += px * y - py * x
             continue
         if model.behind is not None:
             x, z, _gives = end_motion_per_length(model, cables, rows, i)

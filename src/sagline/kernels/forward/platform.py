@@ -15,6 +15,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.stiffness import energy_of_cables, plane_of, stiffnesses_in_plane
+from sagline.kernels.cable.swivel import moment_on_platform, turn_of_swivel
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
@@ -187,9 +188,30 @@ def unbalance(
     gradient[2] += weight
     size = weight + abs(wrench[0]) + abs(wrench[1]) + abs(wrench[2])
     for i in range(cables.shape[0]):
-        add_force(rows, i, rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], gradient)
+        x, y, z = force_on_end(cables, rows, i)
+        add_world_force(rows, i, (x, y, z), gradient)
+        if is_on_platform(cables, i):
+            x, y, z = moment_on_platform(model, cables, rows, i)
+            gradient[3] -= x
+            gradient[4] -= y
+            gradient[5] -= z
         size += rows[g.HORIZONTAL, i] + abs(rows[g.VERTICAL, i])
     return size
+
+
+@formula
+def is_on_platform(cables: Array, i: int) -> bool:
+    """True if the pulley of cable `i` is on the platform."""
+    return tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS and cables[i, tables.ENTRY] == 0.0
+
+
+@formula
+def force_on_end(cables: Array, rows: Array, i: int) -> Triple:
+    """Derivative of the energy of cable `i` by a displacement of its platform end, world axes [N]."""
+    # With the pulley on the platform, all weight of the cable is part of the platform's weight; docs/model.md, 10.11.
+    size = -rows[g.HORIZONTAL, i] if is_on_platform(cables, i) else rows[g.HORIZONTAL, i]
+    up = -rows[g.VERTICAL, i] if is_on_platform(cables, i) else rows[g.VERTICAL, i]
+    return size * rows[g.AZIMUTH_X, i], size * rows[g.AZIMUTH_Y, i], up
 
 
 @formula
@@ -287,9 +309,7 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
         _add_row(stiffness[5], x, by_y)
         _add_row(stiffness[5], -y, by_x)
         # a constant force while r turns: r T^T - (r.T) 1
-        tx = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
-        ty = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
-        tz = rows[g.VERTICAL, i]
+        tx, ty, tz = force_on_end(cables, rows, i)
         stiffness[3, 3] -= y * ty + z * tz
         stiffness[3, 4] += x * ty
         stiffness[3, 5] += x * tz
@@ -299,3 +319,26 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
         stiffness[5, 3] += z * tx
         stiffness[5, 4] += z * ty
         stiffness[5, 5] -= x * tx + y * ty
+        if is_on_platform(cables, i) and rows[g.LEAVING, i] > 0.0:
+            _add_turns(model, cables, rows, i, stiffness)
+
+
+@kernel
+def _add_turns(model: Model, cables: Array, rows: Array, i: int, stiffness: Array) -> None:
+    """Add the part of the stiffness due to the rotation of a pulley with the platform."""
+    (kxx, kxy, kxz), (kyx, kyy, kyz), (kzx, kzy, kzz) = end_stiffness(cables, rows, i)
+    x, y, z = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
+    along_x, by_x = turn_of_swivel(model, cables, rows, i, (1.0, 0.0, 0.0))
+    along_y, by_y = turn_of_swivel(model, cables, rows, i, (0.0, 1.0, 0.0))
+    along_z, by_z = turn_of_swivel(model, cables, rows, i, (0.0, 0.0, 1.0))
+    for a in range(3):
+        ex, ey, ez = along_x if a == 0 else along_y if a == 1 else along_z
+        mx, my, mz = by_x if a == 0 else by_y if a == 1 else by_z
+        fx, fy, fz = kxx * ex + kxy * ey + kxz * ez, kyx * ex + kyy * ey + kyz * ez, kzx * ex + kzy * ey + kzz * ez
+        force = (fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+        _add_row(stiffness[3 + a], 1.0, force)
+        for k in range(6):
+            stiffness[k, 3 + a] += force[k]
+        stiffness[3, 3 + a] += along_x[0] * fx + along_x[1] * fy + along_x[2] * fz - mx
+        stiffness[4, 3 + a] += along_y[0] * fx + along_y[1] * fy + along_y[2] * fz - my
+        stiffness[5, 3 + a] += along_z[0] * fx + along_z[1] * fy + along_z[2] * fz - mz

@@ -13,7 +13,7 @@ from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
-from sagline.kernels.cable.swivel import DATA, SLOPES, TINY, fill_from_results, slopes_of_swivel
+from sagline.kernels.cable.swivel import DATA, SLOPES, TINY, fill_from_results, moments_of_swivel, slopes_of_swivel
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.forward import FLAT
@@ -23,6 +23,7 @@ from sagline.kernels.statics import matrix_along, symmetric_part
 
 # index of the quantity with respect to which the force is differentiated
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
+MORE = SLOPES + DATA + 3  # rows of slopes of cables with swivel axes
 
 
 @formula
@@ -38,7 +39,8 @@ def _describe_cable(
     model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array, more: Array
 ) -> None:
     """Fill `block` (3, 3), `slopes` (DATA, m, 3) and `lever` (3,) of cable `i`, after `platform_stiffness`."""
-    # With swivel axes of any direction, `more` (SLOPES, 5) is filled as well; see `slopes_of_swivel`.
+    # With swivel axes of any direction, `more` (MORE, 5) is filled as well; see `slopes_of_swivel`. For a pulley on the
+    # platform, the last rows are those of `moments_of_swivel`.
     across = f.end_stiffness(cables, rows, i)
     for j in range(3):
         block[0, j] = across[0][j]
@@ -46,10 +48,13 @@ def _describe_cable(
         block[2, j] = across[2][j]
         lever[j] = rows[g.LEVER_X + j, i]
     if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-        slopes_of_swivel(model, cables, rows, i, more)
+        sign = -1.0 if f.is_on_platform(cables, i) else 1.0
+        slopes_of_swivel(model, cables, rows, i, more[:SLOPES])
         for k in range(DATA):
             for j in range(3):
-                slopes[k, i, j] = more[k, j]
+                slopes[k, i, j] = sign * more[k, j]
+        if sign < 0.0:
+            moments_of_swivel(model, cables, rows, i, more[SLOPES:, :3])
         return
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, force, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
@@ -70,6 +75,10 @@ def _at_frame_end(
     """Coefficients of the change of the frame-end tension of cable `i`, after `_describe_cable`."""
     # Three for the change of the force on the platform end, world axes; one for the rise of the platform end [N/m]; one
     # for the change of the length [N/m]. H = T + T^2/(2 EA) - w z is constant along a cable.
+    if f.is_on_platform(cables, i):  # the force on the end is the tension at the frame anchor
+        x, y, z = rows[g.FORCE_X, i], rows[g.FORCE_Y, i], rows[g.FORCE_Z, i]
+        inverse = -1.0 / max(math.sqrt(x * x + y * y + z * z), TINY)
+        return inverse * x, inverse * y, inverse * z, 0.0, 0.0
     if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
         return more[DATA, 3], more[DATA + 1, 3], more[DATA + 2, 3], 0.0, more[BY_LENGTH, 3]
     horizontal, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
@@ -157,11 +166,14 @@ def describe_pose(
     for i in range(rows.shape[1]):
         block, lever, force = out.blocks[p, i], out.levers[p, i], out.forces[p, i]
         _describe_cable(model, cables, rows, i, block, slopes, lever, more)
-        force[0] = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
-        force[1] = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
-        force[2] = rows[g.VERTICAL, i]
+        force[0], force[1], force[2] = f.force_on_end(cables, rows, i)
         parts = _at_frame_end(model, cables, rows, i, more)
-        _fill_tension_slopes(parts, block, slopes[BY_LENGTH, i], lever, out.tensions[p, i])
+        own = out.tensions[p, i]
+        _fill_tension_slopes(parts, block, slopes[BY_LENGTH, i], lever, own)
+        if f.is_on_platform(cables, i):
+            for k in range(3):
+                for j in range(3):
+                    own[3 + k] += own[j] * more[SLOPES + DATA + k, j]
     return True
 
 
@@ -180,7 +192,7 @@ def describe_states(
     """
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, results.shape[2])
-    more, rest = block(rest, SLOPES, 5)
+    more, rest = block(rest, MORE, 5)
     for p in range(poses.shape[0]):
         describe_pose(model, robots, poses, results, p, (rotation, rows, more), States(*found))
 
@@ -266,8 +278,18 @@ def _fill_wrench(wrenches: Array, j: int, lever: Array, x: float, y: float, z: f
     wrenches[5, j] = lever[0] * y - lever[1] * x
 
 
+@kernel
+def _add_turn(wrenches: Array, j: int, turned: Array) -> None:
+    """Add the moment that the force of column `j` has because a pulley on the platform rotates with the platform."""
+    for k in range(3):
+        for a in range(3):
+            wrenches[3 + k, j] += turned[DATA + k, a] * wrenches[a, j]
+
+
 @glue
-def _fill_anchors(p: int, rotation: Array, state: States, wrenches: Array, out: _Sensitivities) -> None:
+def _fill_anchors(
+    p: int, cables: Array, rotation: Array, state: States, turns: Array, wrenches: Array, out: _Sensitivities
+) -> None:
     """Fill the sensitivities to frame anchors and to platform anchors. `wrenches`: (6, 3 m)."""
     compliance = out.compliances[p]
     m = state.levers.shape[1]
@@ -275,6 +297,8 @@ def _fill_anchors(p: int, rotation: Array, state: States, wrenches: Array, out: 
         k, lever = state.blocks[p, i], state.levers[p, i]
         for c in range(3):  # a motion da of the frame end acts as -da of the platform end
             _fill_wrench(wrenches, 3 * i + c, lever, k[0, c], k[1, c], k[2, c])
+            if f.is_on_platform(cables, i):
+                _add_turn(wrenches, 3 * i + c, turns[(DATA + 3) * i : (DATA + 3) * (i + 1)])
     _multiply(1.0, compliance, wrenches, out.by_frame[p])
     for i in range(m):
         force, k, lever = state.forces[p, i], state.blocks[p, i], state.levers[p, i]
@@ -286,6 +310,8 @@ def _fill_anchors(p: int, rotation: Array, state: States, wrenches: Array, out: 
                 k[1, 0] * x + k[1, 1] * y + k[1, 2] * z,
                 k[2, 0] * x + k[2, 1] * y + k[2, 2] * z,
             )  # fmt: skip
+            if f.is_on_platform(cables, i):
+                _add_turn(wrenches, 3 * i + c, turns[(DATA + 3) * i : (DATA + 3) * (i + 1)])
             wrenches[3, 3 * i + c] += y * force[2] - z * force[1]
             wrenches[4, 3 * i + c] += z * force[0] - x * force[2]
             wrenches[5, 3 * i + c] += x * force[1] - y * force[0]
@@ -325,13 +351,14 @@ def sensitivities_of_states(
     state, out = States(*states), _Sensitivities(*found)
     rotation, rest = block(Memory(*memory), 3, 3)
     rows, rest = block(rest, CABLE_ROWS, m)
-    more, rest = block(rest, SLOPES, 5)
+    more, rest = block(rest, MORE, 5)
     work, rest = block(rest, 2 * n + 1, n)
     wrenches, rest = block(rest, 6, m)
     wide, rest = block(rest, 6, 3 * m)
     diagonals, rest = block(rest, 2, n)
     matrix, rest = block(rest, n, m)
     q, rest = block(rest, m + 1, m)
+    turns, rest = block(rest, (DATA + 3) * m, 3)
     for p in range(poses.shape[0]):
         known = describe_pose(model, robots, poses, results, p, (rotation, rows, more), state)
         if not known or not _fill_compliance(robots[0], state.matrices[p], work, out.compliances[p]):
@@ -342,12 +369,22 @@ def sensitivities_of_states(
             out.tensions[p] = math.nan
             out.null[p] = math.nan
             continue
+        cables = f.row_of(robots[2], p)
+        placed = Model(model[0], model[1], model[2], f.row_of(robots[1], p)[tables.GRAVITY], model[3])
+        for i in range(m):
+            if f.is_on_platform(cables, i):
+                moments_of_swivel(placed, cables, rows, i, turns[(DATA + 3) * i : (DATA + 3) * (i + 1)])
         for k in range(DATA):
             for i in range(m):
                 slope = state.slopes[p, k, i]
                 _fill_wrench(wrenches, i, state.levers[p, i], slope[0], slope[1], slope[2])
+                if f.is_on_platform(cables, i):
+                    turned = turns[(DATA + 3) * i : (DATA + 3) * (i + 1)]
+                    _add_turn(wrenches, i, turned)
+                    for c in range(3):
+                        wrenches[3 + c, i] -= turned[k, c]
             _multiply(-1.0, out.compliances[p], wrenches, out.by_data[p, k])
-        _fill_anchors(p, rotation, state, wide, out)
+        _fill_anchors(p, cables, rotation, state, turns, wide, out)
         by_length = out.by_data[p, BY_LENGTH]
         for i in range(m):
             own = state.tensions[p, i]
