@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,7 +17,6 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.main import app
 from sagline.core.arrays import Array
-from sagline.robot.drum import drum_tension
 from tests.kinematics.test_slanted import COGIRO, LEVEL, four_cables
 from tests.refusal import refused
 
@@ -214,15 +214,6 @@ def test_stiffness_and_sensitivities_are_differences_of_the_forward_kinematics()
         np.testing.assert_allclose(found.tension_sensitivity[:, cable], pulled, atol=3e-5 * np.abs(pulled).max())
 
 
-def test_the_energy_changes_by_the_work_of_the_drums() -> None:
-    robot = ROBOTS["heavy"]
-    state = sl.inverse(robot, POSE).state
-    tension, step = drum_tension(state), 2e-4
-    work = tension + tension**2 / (2.0 * robot.cables.axial_stiffness)
-    ends = [sl.forward(robot, state.unstrained_length + h * np.eye(8), POSE).energy for h in (step, -step)]
-    np.testing.assert_allclose((ends[1] - ends[0]) / (2.0 * step), work, rtol=1e-6)  # (wR/T)^2 is neglected
-
-
 def test_four_cables_and_planar_robots_close_along_a_path(tmp_path: Path) -> None:
     tilted = UP + np.array([[0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.0]])
     winches = sl.Winch(0.03, swivel_axis=tilted, on_platform=True)
@@ -260,8 +251,7 @@ def test_robot_files_and_show_say_where_winches_are(tmp_path: Path) -> None:
     assert read is not None
     assert read.on_platform.tolist() == [True, False] * 4
     shown = CliRunner().invoke(app, ["show", str(tmp_path / "some.yaml")])
-    assert "on platform" in shown.stdout
-    assert "(true, false, true, false" in shown.stdout
+    assert re.findall("true|false", shown.stdout) == ["true", "false"] * 4
 
 
 def test_wrong_winches_on_the_platform_are_refused(tmp_path: Path) -> None:

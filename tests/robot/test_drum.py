@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import sagline as sl
 from sagline.robot.drum import Drums, drum_tension
+from tests.kinematics.test_on_platform import POSE, ROBOTS
 from tests.kinematics.winches import wound
 
 
@@ -90,3 +91,12 @@ def test_lengths_are_continuous_at_the_end_of_a_layer(offset: float) -> None:
     before, after = drums.lengths(ends - 1e-9), drums.lengths(ends + 1e-9)
     np.testing.assert_allclose(before, after, rtol=0.0, atol=1e-8)
     assert (before > after).all()
+
+
+def test_the_energy_changes_by_the_work_of_drums_on_the_platform() -> None:
+    robot = ROBOTS["heavy"]
+    state = sl.inverse(robot, POSE).state
+    tension, step = drum_tension(state), 2e-4
+    work = tension + tension**2 / (2.0 * robot.cables.axial_stiffness)
+    ends = [sl.forward(robot, state.unstrained_length + h * np.eye(8), POSE).energy for h in (step, -step)]
+    np.testing.assert_allclose((ends[1] - ends[0]) / (2.0 * step), work, rtol=1e-6)  # (wR/T)^2 is neglected

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
+import sagline as sl
 from sagline.core.arrays import Array
 from sagline.kernels import statics, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.forward import platform
-from sagline.robot.pose import Pose
-from sagline.statics.tables import pose_rows
 from tests.kernels.cable.test_swivel import MODEL, random_cables
 from tests.kernels.compiled import compiled
 
@@ -45,7 +44,7 @@ def random_platforms(seed: int) -> tuple[Array, Array, Array, Array]:
     rng = np.random.default_rng(seed)
     cables, ends, lengths = random_cables(COUNT, seed)
     turns = rng.normal(size=(COUNT, 4))
-    pose = Pose.from_quaternion(rng.normal(size=(COUNT, 3)), turns / np.linalg.norm(turns, axis=1)[:, None])
+    pose = sl.Pose.from_quaternion(rng.normal(size=(COUNT, 3)), turns / np.linalg.norm(turns, axis=1)[:, None])
     anchors = rng.normal(size=(COUNT, 3))
     cables[:, tables.ENTRY] = cables[:, tables.DEAD_RISE] = 0.0
     cables[:, tables.PLATFORM_X : tables.PLATFORM_X + 3] = anchors
@@ -54,7 +53,7 @@ def random_platforms(seed: int) -> tuple[Array, Array, Array, Array]:
     bodies = np.zeros((COUNT, tables.BODY_COLUMNS))
     bodies[:, tables.GRAVITY] = MODEL.gravity
     bodies[:, tables.CENTER_X :] = 0.3 * rng.normal(size=(COUNT, 3))
-    return cables, lengths, bodies, pose_rows(pose)
+    return cables, lengths, bodies, np.hstack((pose.position, pose.quaternion))
 
 
 def of_platforms(cables: Array, lengths: Array, bodies: Array, poses: Array, motion: Array) -> Array:
