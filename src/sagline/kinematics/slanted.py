@@ -126,7 +126,8 @@ def _solve_on_platform(
 
     def run(exits: Array, which: Indices, wider: ArrayLike) -> _Pass:
         """One pass for the poses `which`, at limits that are wider by the share `wider` of their values."""
-        own, body, on = (each[which] if len(each) > 1 else each for each in (table, bodies, aboard))
+        own, body = (each[which] if len(each) > 1 else each for each in (table, bodies))
+        on = own[..., tables.ENTRY, None] == 0.0
         some, load, eyelets = robots_at(robot, which), weights[which], bare[which]
         frame, platform = eyelets[..., : tables.PLATFORM_X], eyelets[..., tables.PLATFORM_X : tables.DENSITY]
         np.copyto(frame, exits, where=~on)
