@@ -290,6 +290,9 @@ REFUSING: dict[str, Callable[[], object]] = {
     "frequency_response": lambda: sl.frequency_response(SOME, POSE, frequency=[1.0]),
     "simulate": lambda: sl.simulate(SOME, POSE, duration=0.05),
     "workspace": lambda: sl.workspace(SOME, cells=4),
+    "workspace of four cables": lambda: sl.workspace(
+        four_cables().replace(winches=sl.Winch(0.03, on_platform=[False] * 3 + [True])), cells=3
+    ),
     "fastest": lambda: sl.fastest(SOME, PATH),
     "calibrate": lambda: sl.calibrate(SOME, LOG),
     "frame_forces": lambda: sl.inverse(SOME, POSE).frame_forces(),

@@ -17,7 +17,7 @@ from sagline.kernels import codes
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_rows import Given, decide_stability, given_codes, solve_underconstrained_rows
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.batch import has_slanted_axes
+from sagline.robot.batch import has_slanted_axes, refuse_slanted
 from sagline.robot.equilibrium import cables_of_results, limited_tension
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -70,6 +70,7 @@ class BalancedMargins:
     def _found_by(self, robot: Robot, rows: Array, load: Array) -> tuple[Array, Indices]:
         """Distances (N,) [N] and limiting cables (N,) of equilibria of `robot`; -infinity without one."""
         model = self._model
+        refuse_slanted(robot, only_platform=True)
         if has_slanted_axes(robot):
             return self._found_by_inverse(robot, rows, load)
         found, placed = solve_underconstrained_rows(

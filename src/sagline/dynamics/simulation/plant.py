@@ -19,7 +19,7 @@ from sagline.kernels.dynamics import motion
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.drives import BIN
-from sagline.robot.batch import has_routing
+from sagline.robot.batch import has_routing, refuse_slanted
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
@@ -61,6 +61,7 @@ class Plant:
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
         """Create the state of `robot` at `pose`; `twist` (6,); `length` (m,) [m]; `data` (DATA_ROWS, m)."""
+        refuse_slanted(robot, only_platform=True)
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data  # the robot at the start
         moments, self.axes = _principal_axes(robot, pose)  # principal axes in the platform frame, one per column
