@@ -291,7 +291,7 @@ REFUSING: dict[str, Callable[[], object]] = {
     "simulate": lambda: sl.simulate(SOME, POSE, duration=0.05),
     "workspace": lambda: sl.workspace(SOME, cells=4),
     "workspace of four cables": lambda: sl.workspace(
-        four_cables().replace(winches=sl.Winch(0.03, on_platform=[False] * 3 + [True])), cells=3
+        four_cables().replace(winches=sl.Winch(0.03, on_platform=[False] * 3 + [True])), cells=4
     ),
     "fastest": lambda: sl.fastest(SOME, PATH),
     "calibrate": lambda: sl.calibrate(SOME, LOG),
