@@ -7,9 +7,8 @@ from types import FunctionType, ModuleType
 import pytest
 
 import sagline as sl
-from sagline.core.results import Saved
+from sagline.core.results import Saved, formats
 from sagline.core.surface import public_names
-from sagline.files.netcdf import writer_of
 from tests.tiers import extended
 from tools.size import public_values
 
@@ -49,7 +48,7 @@ def test_a_module_does_not_hide_the_function_of_its_name(name: str) -> None:
 def test_every_type_with_save_has_a_writer() -> None:
     for kind in public_values().values():
         if isinstance(kind, type) and issubclass(kind, Saved):
-            assert callable(writer_of(object.__new__(kind)).save), kind
+            assert callable(formats().writer_of(object.__new__(kind)).save), kind
 
 
 def test_no_folder_bears_the_name_of_a_public_function() -> None:

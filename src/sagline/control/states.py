@@ -92,7 +92,7 @@ class RefusedError(ThreePartError):
         item: Same text as `what`, because all errors have this attribute.
     """
 
-    between = " is refused: "
+    _between = " is refused: "
 
     def __init__(self, what: str, reason: str, next_step: str) -> None:
         """Compose the message from its three parts."""

@@ -65,7 +65,7 @@ class NoBatchError(InvalidValueError, TypeError):
 class ThreePartError(SaglineError):
     """Base class of errors whose message is an item, a reason, and the next step for the reader."""
 
-    between: ClassVar[str] = ": "  # text between item and reason
+    _between: ClassVar[str] = ": "  # text between item and reason
 
     def __init__(self, item: str, reason: str, next_step: str) -> None:
         """Compose the message from its three parts."""
@@ -74,9 +74,9 @@ class ThreePartError(SaglineError):
 
     def __str__(self) -> str:
         """One line: item, reason, next step."""
-        room = MOST - len(f"{self.between}. ")
+        room = MOST - len(f"{self._between}. ")
         item, reason, next_step = shortened((self.item, self.reason, self.next_step), room)
-        return f"{item}{self.between}{reason}. {next_step}"
+        return f"{item}{self._between}{reason}. {next_step}"
 
 
 class FileError(SaglineError):

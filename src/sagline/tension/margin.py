@@ -95,7 +95,7 @@ def capacity_margin(state: Equilibrium) -> Array:
     return margins.reshape(state.pose.shape)
 
 
-class _UnresistedMotion(NamedTuple):
+class UnresistedMotion(NamedTuple):
     """Platform motion that the cables constrain least.
 
     Attributes:
@@ -111,7 +111,7 @@ class _UnresistedMotion(NamedTuple):
     text: str
 
 
-def unresisted_motion(robot: Robot, pose: PoseLike) -> _UnresistedMotion:
+def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
     """Compute the platform motion with the smallest change of cable lengths, which is zero at a singular pose.
 
     Args:
@@ -119,7 +119,7 @@ def unresisted_motion(robot: Robot, pose: PoseLike) -> _UnresistedMotion:
         pose: One pose.
 
     Returns:
-        _UnresistedMotion with the twist, the resistance of the cables to this twist, and a description in words.
+        UnresistedMotion with the twist, the resistance of the cables to this twist, and a description in words.
 
     Raises:
         InvalidValueError: If `pose` is not a single pose.
@@ -144,7 +144,7 @@ def unresisted_motion(robot: Robot, pose: PoseLike) -> _UnresistedMotion:
     turns = angular * lever > 1e-6 * linear
     twist = twist / (angular if turns else linear)
     resistance = float(values[-1] / values[0]) if len(values) == robot.degrees_of_freedom else 0.0
-    return _UnresistedMotion(locked(twist), resistance, _in_words(robot, pose, twist, turns=bool(turns)))
+    return UnresistedMotion(locked(twist), resistance, _in_words(robot, pose, twist, turns=bool(turns)))
 
 
 def _in_words(robot: Robot, pose: Pose, twist: Array, *, turns: bool) -> str:
