@@ -172,7 +172,7 @@ def test_a_bound_entry_takes_new_numbers() -> None:
     call(np.int64(0), True)
     assert results.all()
     for bad in ((0,), (0, 1, 1), ("0", 1), (0.5, 1), (None, 1)):
-        with pytest.raises(TypeError, match="inverse_poses requires 2 numbers"):
+        with pytest.raises(TypeError, match="inverse_poses"):
             call(*bad)
 
 
