@@ -196,16 +196,15 @@ OF_FORCES: Final = ("axial_stiffness", "linear_density", "mass", "center_of_mass
 DEFAULT: Final = "default"  # in a list of unknowns, it means the default unknowns
 
 
-def _default_unknowns(sensors: Sensors, *, counted: bool, straight: bool) -> tuple[str | Unknown, ...]:
+def _default_unknowns(sensors: Sensors, *, counted: bool, straight: bool) -> list[Unknown]:
     """Default unknowns, with those of further readings if `sensors` has them; `straight`: no forces."""
     cells = () if sensors.tension_deviation is None else OF_CELLS
+    further = [("swivel_zero", sensors.swivel_deviation), ("inertia", sensors.frequency_deviation)]
+    others = (*cells, *(name for name, deviation in further if deviation is not None))
+    found = [Unknown(name) for name in (UNKNOWNS[:2] if straight else (*UNKNOWNS, *others))]
     # measured positions determine the scale of reported lengths; load cells without them do not
     scaled = sensors.position_deviation is not None and not (counted or cells)
-    scale = (Unknown("length_scale", shared=True),) if scaled else ()
-    if straight:
-        return (*UNKNOWNS[:2], *scale)
-    further = [("swivel_zero", sensors.swivel_deviation), ("inertia", sensors.frequency_deviation)]
-    return (*UNKNOWNS, *cells, *(name for name, deviation in further if deviation is not None), *scale)
+    return [*found, Unknown("length_scale", shared=True)] if scaled else found
 
 
 _NOTHING: Final = {"dead_cable": "0 m", "pulley_radius": "0 m"}
@@ -236,10 +235,6 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
     return Parameters(names, labels, units, cables, locked(where), priors, deviations, flags, logarithmic, counted)
 
 
-def _unknown(item: str | Unknown) -> Unknown:
-    return Unknown(item) if isinstance(item, str) else instance(item, Unknown, "unknown")
-
-
 def checked_unknowns(
     unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool, straight: bool = False
 ) -> list[Unknown]:
@@ -247,11 +242,11 @@ def checked_unknowns(
     given = elements(unknowns, str | Unknown, "unknowns", 'Give ("frame_anchors", "mass"), for example.')
     if not given:
         raise InvalidValueError("unknowns", "none", "at least one", f"Name some of {', '.join(KINDS)}.")
-    default = [_unknown(one) for one in _default_unknowns(sensors, counted=counted, straight=straight)]
-    items = [DEFAULT if isinstance(item, str) and item == DEFAULT else _unknown(item) for item in given]
-    named = {item.name for item in items if isinstance(item, Unknown)}
-    others = [one for one in default if one.name not in named]
-    found = [one for item in items for one in ((item,) if isinstance(item, Unknown) else others)]
+    items = [one if isinstance(one, str) else instance(one, Unknown, "unknown") for one in given]
+    named = {one if isinstance(one, str) else one.name for one in items}
+    default = [one for one in _default_unknowns(sensors, counted=counted, straight=straight) if one.name not in named]
+    own = [default if one == DEFAULT else [Unknown(one) if isinstance(one, str) else one] for one in items]
+    found = [one for some in own for one in some]
     names = [one.name for one in found]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Name every unknown once.")

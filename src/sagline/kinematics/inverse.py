@@ -125,12 +125,8 @@ def inverse(
     _check_poses(placed, pose)
     values = inverse_rows.given_codes(shared, given)
     options = kernel_options(robots, model, method) if values is None else None
-    rows, path = pose_rows(pose), motion if isinstance(motion, Path) else None
-    load = external_wrench(wrench, len(pose) if pose.shape else None)
-    if path is not None:
-        load = locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
+    rows, load = pose_rows(pose), _load_of(robots, motion, pose, wrench)
     loads = np.atleast_2d(load)
-    slanted = has_slanted_axes(robots)
     reference = None if options is None else _reference(shared, previous, tension.variable)
 
     def solve(
@@ -145,7 +141,7 @@ def inverse(
         acting, proves = loads[at] if len(loads) > 1 else loads, stability and more is None
         some, acting = locked(rows[at]), locked(acting if more is None else acting + more)
         if options is None or reference is None:
-            asked = values, number(level, "level", "N"), path is not None, stability, report
+            asked = values, number(level, "level", "N"), isinstance(motion, Path), stability, report
             return inverse_rows.solve_underconstrained_rows(robots, model, some, acting, *asked, terms)
         found = inverse_rows.solve_inverse_rows(
             robots, method, options, some, acting, reference.copy(), proves, report, terms, swivels
@@ -153,22 +149,17 @@ def inverse(
         inverse_rows.decide_rows(terms, options, some, acting, found, report)
         return found, some
 
-    if slanted:
+    if has_slanted_axes(robots):
         chained = options is None or options.sharing[0] == codes.CLOSEST
         found, rows = solve_slanted_axes(placed, model, pose, solve, chained)
     else:
         found, rows = solve(robot_terms(robots, anchors=places))
     if options is None:
         pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
-    if (found.pose_status == codes.POSE_NO_CHORD).any():
-        refuse_missing_chords(placed, pose)
-    direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
-    state = _state_of(robots, placed, model, pose, load, found, direction)
+    state = _state_of(robots, placed, model, pose, load, found, turning)
     if stability:
-        if on_platform(robots).any():
-            found.pose_status[found.pose_status == codes.POSE_SOLVED] = codes.UNPROVED_STABILITY
-        inverse_rows.decide_stability(placed, (model.code, *model.parameters), rows, found)
-    plan = _plan_of(state, path, tension, found, anchors)
+        _decide_stability(placed, model, rows, found)
+    plan = _plan_of(state, motion if isinstance(motion, Path) else None, tension, found, anchors)
     return plan if winding is None or turning is not None else _with_path_friction(plan)
 
 
@@ -180,6 +171,23 @@ def _check_poses(robots: Robot | tuple[Robot, ...], pose: Pose) -> None:
     check_poses(len(pose) if pose.shape else 1, shared.cable_count, has_routing(robots))
 
 
+def _load_of(robots: Robot | tuple[Robot, ...], motion: Path | Pose, pose: Pose, wrench: ArrayLike | None) -> Array:
+    """Wrenches (6,) or (N, 6) that the cables bear besides the weight: external and, along a path, inertial."""
+    load = external_wrench(wrench, len(pose) if pose.shape else None)
+    if isinstance(motion, Path):
+        load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
+    return load
+
+
+def _decide_stability(
+    placed: Robot | tuple[Robot, ...], model: CableModel, rows: Array, found: inverse_rows.InverseRows
+) -> None:
+    """Give solved poses (rows `rows`) that are unstable this status in `found`."""
+    if on_platform(placed).any():
+        found.pose_status[found.pose_status == codes.POSE_SOLVED] = codes.UNPROVED_STABILITY
+    inverse_rows.decide_stability(placed, (model.code, *model.parameters), rows, found)
+
+
 def _state_of(
     robots: Robot | tuple[Robot, ...],
     placed: Robot | tuple[Robot, ...],
@@ -187,9 +195,12 @@ def _state_of(
     pose: Pose,
     load: Array,
     found: inverse_rows.InverseRows,
-    direction: Array | None,
+    winding: ArrayLike | None,
 ) -> Equilibrium:
     """Equilibria of the rows `found`, without lengths that are too slack. `placed`: robots with moved anchors."""
+    if (found.pose_status == codes.POSE_NO_CHORD).any():
+        refuse_missing_chords(placed, pose)
+    direction = None if winding is None else checked_winding(winding, pose.shape, first_of(robots).cable_count)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
 
     def equilibrium() -> Equilibrium:

@@ -35,7 +35,7 @@ def test_required_wrench_balances_weight_load_and_sag_forces() -> None:
     needed_wrench(geometry, case.body, case.wrench, sag_force, needed)
     hanging = np.outer(-sag_force, [0.0, 0.0, 1.0])  # of each cable on the platform, at its end
     forces = hanging.sum(axis=0) + np.array([0.0, 0.0, -5.0 * GRAVITY]) + case.wrench[:3]
-    moments = np.cross(geometry[g.LEVER_X :].T, hanging).sum(axis=0) + case.wrench[3:]
+    moments = np.cross(geometry[g.LEVER_X : g.LEVER_X + 3].T, hanging).sum(axis=0) + case.wrench[3:]
     np.testing.assert_allclose(needed, -np.concatenate((forces, moments)), atol=1e-13)
 
 

@@ -41,6 +41,12 @@ def pulley_at(cables: Array, i: int) -> Pulley:
     return Pulley(cables[i, tables.PULLEY_RADIUS], cables[i, tables.ENTRY], dead, rise)
 
 
+@formula
+def is_aboard(cables: Array, i: int) -> bool:
+    """True if the pulley of cable `i` of a cable_table with swivel axes is on the platform."""
+    return cables[i, tables.ENTRY] == 0.0
+
+
 @kernel
 def robots_have_machine(robots: Array) -> bool:
     """True if a cable of any robot (1 or N, m, CABLE_COLUMNS) has a pulley or dead length."""

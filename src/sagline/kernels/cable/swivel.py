@@ -39,7 +39,7 @@ from sagline.kernels.cable.models import (
     relative_excess,
     slack_series,
 )
-from sagline.kernels.cable.pulley import pulley_at
+from sagline.kernels.cable.pulley import is_aboard, pulley_at
 from sagline.kernels.cable.terms import Material, Model, PlaneVector
 from sagline.kernels.jit import entry, formula, glue, independent, kernel
 
@@ -54,7 +54,7 @@ SHORTENINGS = 30  # of one Newton step
 STILL = 1e-10  # change of the free length, relative to the length, after which its error is far below 1e-13
 LENGTHS = 12  # passes for the free length
 SHORTEST = 1e-3  # shortest free length, relative to the whole length
-TINY = 1e-300
+TINY = 1e-30  # also a single-precision number
 DATA = 5  # numbers of a cable by which the derivatives are computed
 SLOPES = DATA + 3  # rows of `slopes_of_swivel`
 
@@ -99,7 +99,7 @@ def _swivel_about(cables: Array, i: int, gravity: float, x: float, y: float, z: 
 def swivel_at(cables: Array, i: int, gravity: float) -> Swivel:
     """Swivel axis, pulley and material of cable `i` of a cable_table with swivel axes; for a pulley at the frame."""
     x, y, z = cables[i, tables.AXIS_X], cables[i, tables.AXIS_Y], cables[i, tables.AXIS_Z]
-    return _swivel_about(cables, i, gravity, x, y, z, cables[i, tables.DEAD_RISE])
+    return _swivel_about(cables, i, gravity, x, y, z, pulley_at(cables, i).rise)
 
 
 @formula
@@ -179,7 +179,8 @@ def exit_in(rows: Array, cables: Array, i: int) -> Vector:
     x = out * rows[g.CENTER_X, i] + along * rows[g.AXIS_X, i]
     y = out * rows[g.CENTER_Y, i] + along * rows[g.AXIS_Y, i]
     z = out * rows[g.CENTER_Z, i] + along * rows[g.AXIS_Z, i]
-    return cables[i, tables.PULLEY_RADIUS] * x, cables[i, tables.PULLEY_RADIUS] * y, cables[i, tables.PULLEY_RADIUS] * z
+    radius = pulley_at(cables, i).radius
+    return radius * x, radius * y, radius * z
 
 
 @formula
@@ -542,7 +543,7 @@ def fill_from_results(model: Model, cables: Array, results: Array, p: int, rows:
         cosine, sine, z = math.cos(azimuth), math.sin(azimuth), results[tables.VERTICAL, p, i]
         rows[g.LENGTH, i] = results[tables.LENGTH, p, i]
         free = rows[g.LENGTH, i] - (results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i])
-        if cables[i, tables.ENTRY] == 0.0:  # the rows are from the pulley on the platform to the frame anchor
+        if is_aboard(cables, i):  # the rows are from the pulley on the platform to the frame anchor
             cosine, sine, z = -cosine, -sine, swivel.weight * free - z
         x, y = horizontal * cosine, horizontal * sine
         down = z - swivel.weight * free
@@ -704,17 +705,17 @@ class _Terms(NamedTuple):
 
 @formula
 def _terms_of_data(
-    s: Swivel, at: Exit, q: _Equations, k: int, cables: Array, i: int, force: Vector, free: float, turning: bool
+    s: Swivel, at: Exit, q: _Equations, k: int, density: float, force: Vector, free: float, turning: bool
 ) -> _Terms:
-    """Derivatives by the data `k` of cable `i`. `turning`: True for a pulley on the platform."""
-    # force: force at the platform end [N]
+    """Derivatives by the data `k` of a cable. `turning`: True for a pulley on the platform."""
+    # density: linear density [kg/m]; force: force at the platform end [N]
     w, soft, (x, y, end), none = s.weight, 1.0 / s.stiffness, force, (0.0, 0.0, 0.0)
     e, v, sz, total = q.strained, 1.0 - at.cosine, at.sz, 1.0 / (q.entering + q.drawn)
     beta, slip, late = w * s.radius * soft, (at.wrap - at.sine) / e, s.dead * total * total / q.drawn
     if k == 0:
         return _Terms((0.0, 0.0, 1.0), 0.0, none, 0.0, 0.0, 0.0, (s.dead * s.x, s.dead * s.y, s.dead * s.z))
     if k == 1:  # a heavier cable also decreases the force at the exit point
-        gravity = w / cables[i, tables.DENSITY] if w > 0.0 else 0.0
+        gravity = w / density if w > 0.0 else 0.0
         one, two, three = _forces_on(s, at, q)[2]
         part = q.integral * s.radius * soft / (e * e * e) - 2.0 * q.bends * soft * q.zeta
         part = s.radius * part + 2.0 * late * soft * s.rise
@@ -765,7 +766,7 @@ def slopes_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: A
     for k in range(SLOPES):
         right, heavier, (dx, dy, dz) = by_z, 0.0, (0.0, 0.0, 0.0)
         if k < DATA:
-            terms = _terms_of_data(s, at, q, k, cables, i, force, free, cables[i, tables.ENTRY] == 0.0)
+            terms = _terms_of_data(s, at, q, k, cables[i, tables.DENSITY], force, free, is_aboard(cables, i))
             right, heavier, (dx, dy, dz) = terms.right, terms.heavier, terms.end
         elif k == DATA:
             right = by_x
@@ -898,7 +899,7 @@ def moments_of_swivel(model: Model, cables: Array, rows: Array, i: int, slopes: 
     force = x, y, z - s.weight * free
     q = _equations(s, at, force[0], force[1], force[2])
     for k in range(DATA):
-        terms = _terms_of_data(s, at, q, k, cables, i, (x, y, z), free, True)
+        terms = _terms_of_data(s, at, q, k, cables[i, tables.DENSITY], (x, y, z), free, True)
         _end, (mx, my, mz) = _end_and_moment(s, at, q, force, free, length, terms)
         if k == 3:  # the exit point moves with the radius
             direct = _cross(terms.end, force)
@@ -932,7 +933,7 @@ def energy_of_swivel(model: Model, cables: Array, rows: Array, i: int) -> float:
         + radius * (tension * at.wrap - swivel.weight * radius * integral / strained)
         + swivel.stiffness * swivel.dead * on_run / (3.0 * (2.0 + total))
         - whole * (at.wrapped + at.dead)
-        + (swivel.weight * rows[g.LENGTH, i] * swivel.rise if cables[i, tables.ENTRY] == 0.0 else 0.0)
+        + (swivel.weight * rows[g.LENGTH, i] * swivel.rise if is_aboard(cables, i) else 0.0)
     )
 
 

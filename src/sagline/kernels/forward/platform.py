@@ -14,6 +14,7 @@ from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import cable_geometry
+from sagline.kernels.cable.pulley import is_aboard
 from sagline.kernels.cable.stiffness import energy_of_cables, plane_of, stiffnesses_in_plane
 from sagline.kernels.cable.swivel import moment_on_platform, turn_of_swivel
 from sagline.kernels.cable.terms import Model
@@ -202,7 +203,7 @@ def unbalance(
 @formula
 def is_on_platform(cables: Array, i: int) -> bool:
     """True if the pulley of cable `i` is on the platform."""
-    return tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS and cables[i, tables.ENTRY] == 0.0
+    return tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS and is_aboard(cables, i)
 
 
 @formula

@@ -8,6 +8,7 @@ variable of the distribution is the frame-end tension, the balance is linearized
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, statics, tables
@@ -51,17 +52,24 @@ CONVERGED = 1e-10  # largest change of a converged sag force, in N and relative 
 SAG_ROUNDING = 1e-15
 
 
+class Method(NamedTuple):
+    """Tension distribution of a batch, and its reference point."""
+
+    distribution: nearest.Distribution
+    near: nearest.ReferencePoint
+
+
 @glue
 def distribute_and_solve_cables(
-    model: Model, distribution: nearest.Distribution, platform: statics.Platform, cables: Cables,
-    balance: statics.Balance, near: nearest.ReferencePoint, work: WorkArrays | None, exits: Exits | None,
-    statuses: Codes,
+    model: Model, method: Method, platform: statics.Platform, cables: Cables,
+    balance: statics.Balance, work: WorkArrays | None, exits: Exits | None, statuses: Codes,
 ) -> int:  # fmt: skip
     """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status."""
     # `cables`: the cables from `set_pose`, with tensions, ratios and sag forces to be filled. `work`: work arrays for
     # frame-end tensions and for methods that are not projections; if None, this code is not compiled. `exits`: pulleys
     # with swivel axes of any direction; the cables start at eyelets at their exit points. `statuses`: filled with the
     # status of each cable, (m,).
+    distribution, near = method.distribution, method.near
     near.held.labels[0] = 0
     if work is not None:
         reset_work_arrays(work)
@@ -95,11 +103,10 @@ def distribute_and_solve_cables(
             break
         status = codes.POSE_NOT_CONVERGED
         change = sag_force_change(cables)
-        converged = model.code != codes.CATENARY or (
-            change <= CONVERGED + SAG_ROUNDING * largest and turned <= states.SAME_EXIT
+        converged = away <= SAME_EXIT and (
+            model.code != codes.CATENARY
+            or (change <= CONVERGED + SAG_ROUNDING * largest and turned <= states.SAME_EXIT)
         )
-        if exits is not None:
-            converged = converged and away <= SAME_EXIT
         if work is None or distribution.variable != codes.FRAME_END_TENSION:
             if converged:
                 status = codes.POSE_SOLVED
@@ -263,7 +270,7 @@ def inverse_poses(
         status = statics.set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
         if status == codes.POSE_SOLVED:
             status = distribute_and_solve_cables(
-                model, distribution, platform, cables, balance, near, others, None, statuses[p]
+                model, Method(distribution, near), platform, cables, balance, others, None, statuses[p]
             )
         if status == codes.POSE_SOLVED:
             measure_balance(None, platform, cables, balance, residuals[p])

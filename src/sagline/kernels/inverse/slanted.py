@@ -63,7 +63,7 @@ def inverse_poses_of_slanted(
         status = statics.set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
         if status == codes.POSE_SOLVED:
             status = inverse.distribute_and_solve_cables(
-                model, distribution, platform, cables, balance, near, others, exits, statuses[p]
+                model, inverse.Method(distribution, near), platform, cables, balance, others, exits, statuses[p]
             )
         if status == codes.POSE_SOLVED:
             inverse.measure_balance(exits, platform, cables, balance, residuals[p])

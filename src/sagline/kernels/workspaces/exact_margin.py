@@ -20,7 +20,7 @@ from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
 from sagline.kernels.cable.states import TensionLimits
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.feasibility import demand_of_pose, new_demand
-from sagline.kernels.inverse.poses import distribute_and_solve_cables
+from sagline.kernels.inverse.poses import Method, distribute_and_solve_cables
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import Balance, Platform, along_freedom, new_balance, set_pose
@@ -130,7 +130,7 @@ def _distributes_tensions(
     status = set_pose(curves.model, limits, codes.CHORD_TENSION, weight, platform, curves.cables, balance)
     if status == codes.POSE_SOLVED:
         status = distribute_and_solve_cables(
-            curves.model, distribution, platform, curves.cables, balance, near, None, None, curves.statuses
+            curves.model, Method(distribution, near), platform, curves.cables, balance, None, None, curves.statuses
         )
     if status == codes.POSE_SOLVED:
         copy(curves.cables.tau, tau)

@@ -118,9 +118,7 @@ def signed_margins(
         arm, lever = arms[0][p * arms[0].size // count], arms[1][p * arms[1].size // count]
         platform = Platform(freedom, body, robot, poses[p], wrench)
         curves, left = new_curves(model_at(model_terms, body), cables, memory[2], rest)
-        statuses[p], limiting[p] = _set_pose(
-            limits, platform, lever, curves, walk, rotation, geometry, bands, counted[facets.COLUMN :], left
-        )
+        statuses[p], limiting[p] = _set_pose(limits, platform, lever, curves, walk, rotation, rows, left)
         if statuses[p] != codes.MARGIN_OPEN:
             continue
         wrench_set.place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
@@ -132,9 +130,8 @@ def signed_margins(
         limiting[p] = _limiting_cable(counts, directions[p]) if found[VALUE] < math.inf else -1
         statuses[p] = _margin_status(found)
         if counts.curved and statuses[p] == codes.MARGIN_OPEN:
-            statuses[p] = _settle_sign(
-                limits, platform, curves, counts, bands, wrenches, set_terms[0], directions[p], found, left
-            )
+            facet = _limiting_facet(counts, bands, wrenches, set_terms[0], directions[p], wrench)
+            statuses[p] = settle_margin(curves.model, limits, platform, facet, curves, found, left)
         for k in range(3):
             values[k, p] = found[k]
 
@@ -147,14 +144,15 @@ def _set_pose(
     curves: Curves,
     walk: facets.Facets,
     rotation: Array,
-    geometry: Array,
-    bands: Array,
-    columns: Array,
+    rows: Array,
     memory: Memory,
 ) -> tuple[int, int]:
     """Fill geometry, structure matrix, basis and bands. Returns a status, and a cable without tensions, or -1."""
-    # `columns`: filled with the structure matrix, (6, m). The status is MARGIN_OPEN if the pose can be measured.
+    # `rows`: filled with geometry, bands, and the structure matrix in the rows of the facets. The status is MARGIN_OPEN
+    # if the pose can be measured.
     model, cables = curves.model, curves.cables
+    geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + sag.BAND_ROWS]
+    columns = rows[g.GEOMETRY_ROWS + sag.BAND_ROWS + facets.COLUMN :]
     cable_geometry(platform.robot, platform.body, platform.pose, rotation, geometry)
     if not place_cables(model, limits, platform.robot, geometry, cables):
         return codes.MARGIN_NO_CHORD, -1
@@ -170,28 +168,23 @@ def _set_pose(
 
 
 @glue
-def _settle_sign(
-    limits: TensionLimits,
-    platform: Platform,
-    curves: Curves,
+def _limiting_facet(
     counts: facets.FacetWeights,
     bands: Array,
     wrenches: wrench_set.WrenchSetArrays,
     center: Array,
     direction: Array,
-    margin: Array,
-    memory: Memory,
-) -> int:
-    """Replace `margin` (3,) by the margin with exact sag forces. Returns its status."""
+    wrench: Array,
+) -> LimitingFacet:
+    """Facet with the normal `direction`, for the margin with exact sag forces; `wrench` (6,) is filled."""
     rows = counts.rows
-    single = wrench_set.worst_wrench(center, wrenches, direction, platform.wrench)
+    single = wrench_set.worst_wrench(center, wrenches, direction, wrench)
     for k in range(6):
         counts.middle[k] -= center[k]
     levers = rows[facets.LEVER_X : facets.LEVER_Y + 1]
-    facet = LimitingFacet(
+    return LimitingFacet(
         direction, rows[facets.COLUMN :], rows[facets.WIDTH], levers, counts.middle, bands, counts.arm, single
     )
-    return settle_margin(curves.model, limits, platform, facet, curves, margin, memory)
 
 
 @glue
