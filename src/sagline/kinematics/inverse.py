@@ -172,7 +172,7 @@ def _check_poses(robots: Robot | tuple[Robot, ...], pose: Pose) -> None:
 
 
 def _load_of(robots: Robot | tuple[Robot, ...], motion: Path | Pose, pose: Pose, wrench: ArrayLike | None) -> Array:
-    """Wrenches (6,) or (N, 6) that the cables bear besides the weight: external and, along a path, inertial."""
+    """Wrenches (6,) or (N, 6) of the loads on the platform: external and, along a path, inertial."""
     load = external_wrench(wrench, len(pose) if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
