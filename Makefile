@@ -44,7 +44,7 @@ OUTER = $(if $(FOLDER),$(addprefix tests/,$(filter-out $(INNER),$(FOLDER))),test
 CHOSEN = $(addprefix tests/,$(if $(FOLDER),$(filter $(INNER),$(FOLDER)),$(INNER)))
 define run_tests
 	$(if $(OUTER),$(PYTEST) $(OUTER) -m "$(1)" $(PARALLEL))
-	$(if $(CHOSEN),SAGLINE_BACKEND=numba $(PYTEST) $(CHOSEN) -m "$(1)" $(PARALLEL))
+	$(if $(CHOSEN),SAGLINE_BACKEND=numba $(PYTEST) $(CHOSEN) -m "$(1)" $(PARALLEL) --dist loadfile) # compiles once a file
 endef
 
 test: env ## the first tier of the tests: minutes
