@@ -7,6 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from sagline.article import drawing
+from sagline.article import report as page
 from sagline.article.report import ArticleReport, write_article
 from sagline.present.page import Panel
 from tests.tiers import wide
@@ -37,9 +38,9 @@ def written_with_figures(folder: Path, parts: tuple[str, ...] = ()) -> Written:
         return panel(name, figure, caption, legend)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawing, "panel_of", report_kept_for_all_tests)
-        report = write_article(folder, parts)
-    return Written(report, figures, not parts)
+        for module in (drawing, page):
+            patch.setattr(module, "panel_of", report_kept_for_all_tests)
+        return Written(write_article(folder, parts), figures, not parts)
 
 
 @pytest.fixture(scope="session")
