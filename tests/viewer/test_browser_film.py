@@ -135,6 +135,16 @@ def test_a_film_shows_the_run_with_clock_and_legend(
     assert platform_column(last) - platform_column(first) > 10.0  # it goes to the right
 
 
+def test_a_picture_after_a_canceled_film_does_not_end_the_connection(browser: Browser) -> None:
+    robot = sl.load_robot("article-suspended")
+    with opened(browser, robot) as (page, viewer):
+        (client,) = viewer.server.get_clients().values()
+        picture = client.get_render(1080, 1920, transport_format="png")  # no film keeps it: 100 kB as a message
+        assert picture.shape[:2] == (1, 1)
+        assert list(viewer.server.get_clients().values()) == [client]
+        assert page.locator("#sagline-film").count() == 0
+
+
 @pytest.mark.soak
 def test_a_browser_without_an_encoder_records_the_film_in_real_time(
     browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch

@@ -1,4 +1,5 @@
-// Pictures that the server requests stay on this page; the server receives a single pixel instead.
+// Pictures that the server requests stay on this page; the server always receives a single pixel instead. It refuses
+// large messages, so a picture sent after a film is canceled would end the connection.
 // A picture for print (features/export.py) is saved at once, with its dots per inch.
 (() => {
   const PIXEL =
@@ -9,11 +10,11 @@
   window.Worker = class extends window.Worker {
     postMessage(data, ...rest) {
       const { message } = data ?? {};
-      if (keeper && message?.type === "GetRenderResponseMessage" && message.payload.length) this.keep(data);
+      if (message?.type === "GetRenderResponseMessage" && message.payload.length) this.keep(data);
       else super.postMessage(data, ...rest);
     }
     async keep(data) {
-      await keeper(new Blob([data.message.payload])); // the next picture is requested after this one is processed
+      await keeper?.(new Blob([data.message.payload])); // the next picture is requested after this one is processed
       super.postMessage({ ...data, message: { ...data.message, payload: pixel() } });
     }
   };
