@@ -39,12 +39,12 @@ article: env ## the article's figures, tables and errata redone, as one page in 
 test test-extended coverage record mutants soak: export OPENBLAS_NUM_THREADS := 1 # a worker has a core
 PYTEST = $(BIN)/python -m pytest
 PARALLEL := --numprocesses auto --dist worksteal
-INNER := kernels translate # tests of single kernels, which numba compiles; the others run the library
+INNER := kernels translate # tests of single kernels, which numba compiles once a file; the others run the library
 OUTER = $(if $(FOLDER),$(addprefix tests/,$(filter-out $(INNER),$(FOLDER))),tests $(addprefix --ignore=tests/,$(INNER)))
 CHOSEN = $(addprefix tests/,$(if $(FOLDER),$(filter $(INNER),$(FOLDER)),$(INNER)))
 define run_tests
 	$(if $(OUTER),$(PYTEST) $(OUTER) -m "$(1)" $(PARALLEL))
-	$(if $(CHOSEN),SAGLINE_BACKEND=numba $(PYTEST) $(CHOSEN) -m "$(1)" $(PARALLEL) --dist loadfile) # compiles once a file
+	$(if $(CHOSEN),SAGLINE_BACKEND=numba $(PYTEST) $(CHOSEN) -m "$(1)" $(PARALLEL) --dist loadfile)
 endef
 
 test: env ## the first tier of the tests: minutes

@@ -62,7 +62,12 @@ def finding(
     statement, measured = (_Numbers().format(entry.get(part, ""), **{**known, **words}) for part in _PARTS)
     chosen = Verdict[entry["verdict"]] if verdict is None else verdict
     return Finding(
-        *(key, entry["title"], statement, measured, chosen, known),
+        key,
+        entry["title"],
+        statement,
+        measured,
+        chosen,
+        known,
         figures=tuple(entry.get("figures", ())),
         tables=tuple(entry.get("tables", ())),
         panels=tuple(panel_of(f"{key}-{k}", *drawing) for k, drawing in enumerate(panels)),

@@ -175,6 +175,19 @@ def structure_matrices(geometries: Array, matrices: Array) -> None:
 Triple = tuple[float, float, float]
 
 
+@formula
+def add_world_force(rows: Array, i: int, force: Triple, wrench: Array) -> None:
+    """Add to `wrench` (6,) a `force` at the platform end of cable `i`, world axes [N]."""
+    x, y, z = force
+    rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
+    wrench[0] += x
+    wrench[1] += y
+    wrench[2] += z
+    wrench[3] += ry * z - rz * y
+    wrench[4] += rz * x - rx * z
+    wrench[5] += rx * y - ry * x
+
+
 @kernel
 def step_pose(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
     """Fill the pose `moved` after `step` (n,) along the free motions, and the `motion` (6,) of this step."""

@@ -37,8 +37,9 @@ class Winch:
             passes through the frame anchor.
         swivel_axis: Unit vector of shape (..., 3) in the direction in which the cable enters the pulley, world axes: up
             (0, 0, 1) for a drum below the pulley, down (0, 0, -1), or any other direction. With another direction,
-            `inverse`, `forward`, `confirm`, `stiffness` and `modes` compute the robot, with the models `Catenary` and
-            `Elastic` and without friction; functions that do not support it refuse it.
+            `inverse`, `forward`, `confirm`, `stiffness`, `modes`, `calibrate` and `simulate` (without cable mass)
+            compute the robot, with the models `Catenary` and `Elastic` and without friction; functions that do not
+            support it refuse it.
         on_platform: True if winch and pulley are on the platform. The cable then enters the pulley at the platform
             anchor and ends at the frame anchor; the swivel axis is in the platform frame. The dead length is on the
             swivel axis; guides and dead_rise are not allowed. Mass, center of mass and inertia of the robot include

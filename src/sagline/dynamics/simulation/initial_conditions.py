@@ -125,10 +125,10 @@ class TimeTable:
         k = int(np.searchsorted(self.time, time))
         value, rate = self.at(time)
         times, values = np.insert(self.time, k, time), np.insert(self.value, k, value, axis=0)
-        inside = 0 < k < len(self.time)
-        rate = rate if inside else np.zeros_like(rate)
-        first, second = (k, k - 1) if inside else (min(k, len(self.begin)),) * 2
-        begin, end = np.insert(self.begin, first, rate, axis=0), np.insert(self.end, second, rate, axis=0)
+        if 0 < k < len(self.time):
+            begin, end = np.insert(self.begin, k, rate, axis=0), np.insert(self.end, k - 1, rate, axis=0)
+        else:  # before the first or after the last time, values are constant
+            begin, end = (np.insert(rates, min(k, len(rates)), 0.0, axis=0) for rates in (self.begin, self.end))
         return TimeTable(times, values, begin, end)
 
     def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:

@@ -24,10 +24,10 @@ from sagline.kernels.dynamics.chain import wind_across
 from sagline.kernels.dynamics.drives import Drives, keep_set_points
 from sagline.kernels.dynamics.progress import Courses, Kept
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, VELOCITY, power_of, spin
-from sagline.kernels.forward.platform import add_force, add_world_force, platform_energy, unbalance
+from sagline.kernels.forward.platform import add_force, platform_energy, unbalance
 from sagline.kernels.jit import entry, glue, kernel
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.statics import components_along, fill_motion_of_components
+from sagline.kernels.statics import add_world_force, components_along, fill_motion_of_components
 
 SPLITTING, RUNGE_KUTTA = 0, 1
 DAMPED, LOADED, BLOWN, MOVED = 1, 2, 4, 8  # one bit for each kind of damping, load, or motion of anchors

@@ -18,7 +18,7 @@ from sagline.kernels.cable.swivel import exit_in
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.jit import glue, kernel
-from sagline.kernels.statics import components_along, matrix_along, step_pose, symmetric_part
+from sagline.kernels.statics import add_world_force, components_along, matrix_along, step_pose, symmetric_part
 
 
 @kernel
@@ -73,7 +73,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
             wound = lengths[i] - length
             wound = -wound if f.is_on_platform(cables, i) else wound
             x, y, z = wound * rows[g.LONGER_X, i], wound * rows[g.LONGER_Y, i], wound * rows[g.LONGER_Z, i]
-            f.add_world_force(rows, i, (x, y, z), wrench)
+            add_world_force(rows, i, (x, y, z), wrench)
             if f.is_on_platform(cables, i):  # almost the whole moment
                 px, py, pz = exit_in(rows, cables, i)
                 wrench[3] += py * z - pz * y

@@ -20,7 +20,7 @@ from sagline.kernels.cable.swivel import moment_on_platform, turn_of_swivel
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
-from sagline.kernels.statics import Triple, is_rotation
+from sagline.kernels.statics import Triple, add_world_force, is_rotation
 
 UNIT_SHARE = 0.2  # displacement with the same weight as a rotation by 1 rad, relative to the mean length
 
@@ -219,19 +219,6 @@ def force_on_end(cables: Array, rows: Array, i: int) -> Triple:
 def add_force(rows: Array, i: int, horizontal: float, vertical: float, wrench: Array) -> None:
     """Add to `wrench` (6,) a force at the platform end of cable `i`, in the cable's plane."""
     add_world_force(rows, i, (horizontal * rows[g.AZIMUTH_X, i], horizontal * rows[g.AZIMUTH_Y, i], vertical), wrench)
-
-
-@formula
-def add_world_force(rows: Array, i: int, force: Triple, wrench: Array) -> None:
-    """Add to `wrench` (6,) a `force` at the platform end of cable `i`, world axes [N]."""
-    x, y, z = force
-    rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
-    wrench[0] += x
-    wrench[1] += y
-    wrench[2] += z
-    wrench[3] += ry * z - rz * y
-    wrench[4] += rz * x - rx * z
-    wrench[5] += rx * y - ry * x
 
 
 @kernel

@@ -101,13 +101,7 @@ def fill_needed_wrench(
         x = tau * (cables.cosine[i] * rows[g.AZIMUTH_X, i] + full[0, i])
         y = tau * (cables.cosine[i] * rows[g.AZIMUTH_Y, i] + full[1, i])
         z = tau * (cables.sine[i] + full[2, i])
-        rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
-        needed[0] += x
-        needed[1] += y
-        needed[2] += z
-        needed[3] += ry * z - rz * y
-        needed[4] += rz * x - rx * z
-        needed[5] += rx * y - ry * x
+        statics.add_world_force(rows, i, (x, y, z), needed)
     statics.along_freedom(platform.freedom, needed, balance.right)
 
 
