@@ -24,7 +24,7 @@ from sagline.kinematics.inverse_rows import SOLVED, InverseRows
 from sagline.robot.batch import Robots, cables_of, first_of, on_platform, robots_at
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
-from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing_chords, robot_terms
+from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing_chords, robot_terms, tangent_eyelets
 
 if TYPE_CHECKING:
     from sagline.kernels.inverse.poses import Robots as RobotTerms
@@ -153,18 +153,16 @@ def _solve_on_platform(
         np.copyto(numbers[..., :3], (numbers[..., :3] - place[:, None]) @ matrix, where=on)
         return _Pass(found, rows, chord, numbers, change)
 
-    span = _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
-    exits = ends - span
-    exits = np.where(aboard, (exits - places[:, None]) @ matrices, exits)
-    return _pass_by_pass(run, exits, np.arange(len(exits)))
+    straight = tangent_eyelets(table, pose, geometry)
+    frame, platform = straight[..., : tables.PLATFORM_X], straight[..., tables.PLATFORM_X : tables.DENSITY]
+    return _pass_by_pass(run, np.where(aboard, platform, frame), np.arange(len(straight)))
 
 
 def _tangent_exits(robot: Robots, pose: Pose, table: Array) -> Array:
-    """Exit points (N, m, 3) [m] of straight cables."""
+    """Exit points (N, m, 3) [m] of straight cables from pulleys at the frame."""
     geometry = chord_geometry(robot, pose, slanted=True)
     refuse_missing_chords(robot, pose, geometry)
-    ends = _ends(table, pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3))
-    return ends - _world(geometry[:, g.AZIMUTH_X], geometry[:, g.AZIMUTH_Y], geometry[:, g.SPAN], geometry[:, g.RISE])
+    return tangent_eyelets(table, pose, geometry)[..., : tables.PLATFORM_X]
 
 
 def _pass_by_pass(
@@ -263,13 +261,6 @@ def _weight_taken(
 def _norm(vectors: Array) -> Array:
     """Lengths of vectors (..., 3); faster than numpy's norm."""
     return np.asarray(np.sqrt(np.einsum("...k,...k->...", vectors, vectors)))
-
-
-def _world(cosine: Array, sine: Array, level: Array, up: Array) -> Array:
-    """Vectors (..., 3) in world axes from their components in vertical planes with the azimuth of `cosine`, `sine`."""
-    vectors = np.empty((*up.shape, 3))
-    vectors[..., 0], vectors[..., 1], vectors[..., 2] = level * cosine, level * sine, up
-    return vectors
 
 
 def _next_exits(

@@ -98,12 +98,13 @@ def refuse_slanted(robot: Robots, *, only_platform: bool = False) -> None:
         if refused.any():
             cable = int(np.argmax(refused))
             if winches.on_platform[cable]:
-                step = "On the platform: use inverse, forward, confirm, stiffness or modes, without friction."
+                step = "On the platform: use inverse, forward, confirm, stiffness or modes, without friction; or "
+                step += "margin or workspace, with massless cables."
                 raise InvalidValueError(f"winches: on_platform[{cable}]", "true", "false here", step)
             shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
             step = (
                 "Other axes: use inverse, forward, confirm, stiffness, modes, calibrate or simulate (massless cables), "
-                "without friction; or workspace, with fewer cables than freedoms."
+                "without friction; or margin or workspace (massless cables, or fewer cables than freedoms)."
             )
             raise InvalidValueError(f"winches: swivel_axis[{cable}]", f"({shown})", "up or down here", step)
 

@@ -7,10 +7,9 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Flags, locked
 from sagline.core.errors import CableGeometryError, InvalidValueError
-from sagline.kernels import codes
+from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
-from sagline.kernels.tables import FRAME_X, FRAME_Z, SHORTEST_CHORD
 from sagline.robot.batch import Robots, first_of, has_slanted_axes, on_platform, pulleys_of, refuse_slanted
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -64,7 +63,7 @@ def robot_terms(robot: Robots, slanted: bool = False, anchors: Array | None = No
     table = cable_table(robot, slanted)
     if anchors is not None:
         table = np.repeat(table, len(anchors), axis=0)
-        table[..., FRAME_X : FRAME_Z + 1] = anchors
+        table[..., tables.FRAME_X : tables.FRAME_Z + 1] = anchors
     return first_of(robot).freedom, body_table(robot), locked(table)
 
 
@@ -86,17 +85,41 @@ def _cable_rows(robot: Robot, pulleys: tuple[Array, Array]) -> Array:
 
 def chord_geometry(robot: Robots, pose: Pose, slanted: bool = False) -> Array:
     """Geometry (N, GEOMETRY_ROWS, m) of all cables at all poses; rows of `sagline.kernels.cable.geometry`."""
-    cables, poses = cable_table(robot, slanted), pose_rows(pose)
+    return geometry_of(cable_table(robot, slanted), body_table(robot), pose_rows(pose))
+
+
+def geometry_of(cables: Array, bodies: Array, poses: Array) -> Array:
+    """`chord_geometry` of a `cable_table`, a `body_table` and pose rows (N, POSE_COLUMNS)."""
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
     with np.errstate(all="ignore"):
-        cable_geometries(cables, body_table(robot), poses, np.empty((3, 3)), out)
+        cable_geometries(cables, bodies, poses, np.empty((3, 3)), out)
     return out
+
+
+def tangent_eyelets(table: Array, pose: Pose, geometry: Array) -> Array:
+    """Table (N, m, CABLE_COLUMNS) of cables from eyelets at the exit points of straight cables; NaN without a tangent.
+
+    `table` (1 or N, m, SWIVEL_COLUMNS) and `geometry` (N, GEOMETRY_ROWS, m) have swivel axes of any direction.
+    """
+    aboard, frame = table[..., tables.ENTRY, None] == 0.0, table[..., : tables.PLATFORM_X]
+    platform = table[..., tables.PLATFORM_X : tables.DENSITY]
+    place, matrix = pose.position.reshape(-1, 1, 3), pose.matrix.reshape(-1, 3, 3)
+    level = geometry[:, rows.SPAN, :, None] * np.moveaxis(geometry[:, rows.AZIMUTH_X : rows.AZIMUTH_Y + 1], 1, -1)
+    tangent = np.concatenate((level, geometry[:, rows.RISE, :, None]), axis=-1)
+    exits = np.where(aboard, frame, place + platform @ np.swapaxes(matrix, -1, -2)) - tangent
+    eyelets = np.empty((len(exits), table.shape[1], tables.CABLE_COLUMNS))
+    eyelets[:] = table[..., : tables.CABLE_COLUMNS]
+    eyelets[..., tables.PULLEY_RADIUS :] = 0.0
+    eyelets[..., tables.ENTRY] = 1.0
+    np.copyto(eyelets[..., : tables.PLATFORM_X], exits, where=~aboard)
+    np.copyto(eyelets[..., tables.PLATFORM_X : tables.DENSITY], (exits - place) @ matrix, where=aboard)
+    return eyelets
 
 
 def has_chords(robot: Robot, pose: Pose) -> Flags:
     """True for poses (N,) at which every cable has a chord."""
     chord = chord_geometry(robot, pose, slanted=True)[:, rows.CHORD]
-    return np.asarray((chord >= SHORTEST_CHORD).all(axis=1))
+    return np.asarray((chord >= tables.SHORTEST_CHORD).all(axis=1))
 
 
 def touching_angle(robot: Robot, pose: Pose) -> Array:
@@ -110,7 +133,7 @@ def touching_angle(robot: Robot, pose: Pose) -> Array:
 def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = None) -> None:
     """Refuse poses at which both ends of a cable coincide, or no tangent to the pulley exists."""
     chord = (chord_geometry(robot, pose) if geometry is None else geometry)[:, rows.CHORD]
-    missing = np.argwhere(~(chord >= SHORTEST_CHORD))
+    missing = np.argwhere(~(chord >= tables.SHORTEST_CHORD))
     if not len(missing):
         return
     row, cable = (int(k) for k in missing[0])
@@ -126,7 +149,7 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
     raise CableGeometryError(
         f"{item}: distance between its ends",
         f"{round(float(chord[row, cable]), 12):g} m",
-        f">= {SHORTEST_CHORD:g} m",
+        f">= {tables.SHORTEST_CHORD:g} m",
         "Move the platform or the anchor, so that the two ends are apart.",
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,13 +20,16 @@ from sagline.kernels import codes, tables
 from sagline.kernels.memory import memory_for
 from sagline.kernels.workspaces.signed_margin import margin_memory, signed_margins
 from sagline.kernels.workspaces.wrench_set import SetTerms
-from sagline.robot.batch import Robots, first_of, one_a_pose, robot_fields, together
+from sagline.robot.batch import Robots, first_of, has_slanted_axes, one_a_pose, refuse_slanted, robot_fields, together
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_cable_count, check_reach
 from sagline.robot.robot import Robot
-from sagline.statics.tables import pose_rows, robot_terms
+from sagline.statics.tables import geometry_of, pose_rows, robot_terms, tangent_eyelets
 from sagline.tension.method import LIMITS_OF
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet, load_of
+
+if TYPE_CHECKING:
+    from sagline.kernels.inverse.poses import Robots as RobotTerms
 
 BLOCK = 1 << 13  # poses per block; a block takes about 0.1 s, and interrupts are handled between blocks
 _CATENARY = Catenary()
@@ -64,12 +67,15 @@ class MarginRows:
         # If `cables` (R, m, CABLE_COLUMNS) is given, the R robots are copies of `robot` with these tables of cables.
         robots = together(robot)
         shared = first_of(robots)
-        freedom, bodies, table = robot_terms(robots)
+        if not model.weightless:
+            refuse_slanted(robots)
+        freedom, bodies, table = robot_terms(robots, slanted=cables is None)
         if cables is not None:
             table = _locked(cables)
         check_cable_count(shared)
         self.cable_count = m = shared.cable_count
-        if table.shape[1:] != (m, tables.CABLE_COLUMNS) or not len(table) or len(bodies) not in (1, len(table)):
+        alike = cables is None or table.shape[1:] == (m, tables.CABLE_COLUMNS)
+        if not alike or not len(table) or len(bodies) not in (1, len(table)):
             wanted, step = f"shape (R, {m}, {tables.CABLE_COLUMNS})", "Make the tables with cable_table(robot)."
             raise InvalidValueError("cables", f"of shape {table.shape}", wanted, step)
         self.robot_count = len(table)
@@ -105,7 +111,8 @@ class MarginRows:
             np.empty(count, dtype=np.int64),
             np.empty(count, dtype=np.int8),
         )
-        given = (*self._given, locked(rows), memory, margins)
+        model, limits, terms, loads, arms = self._given
+        given = (model, limits, _at_tangents(terms, rows), loads, arms, locked(rows), memory, margins)
         if count <= BLOCK and progress is None:
             signed_margins(*given, 0, count)
         else:
@@ -113,6 +120,17 @@ class MarginRows:
                 signed_margins(*given, part.start, part.stop)
         values, directions, limiting, statuses = margins
         return Bracket(values[0], values[1], values[2], limiting, statuses, directions)
+
+
+def _at_tangents(terms: RobotTerms, rows: Array) -> RobotTerms:
+    """Robot arrays with the exit points of straight cables at the poses `rows`, if the swivel axes are slanted."""
+    freedom, bodies, table = terms
+    if table.shape[2] == tables.CABLE_COLUMNS:
+        return terms
+    # these cables are cables from eyelets at their exit points
+    table = locked(np.repeat(table, len(rows) // len(table), axis=0)) if len(table) > 1 else table
+    pose = Pose._adopt(rows[:, :3], rows[:, 3:])
+    return freedom, bodies, locked(tangent_eyelets(table, pose, geometry_of(table, bodies[:1], rows)))
 
 
 def mean_arms(table: Array, bodies: Array) -> Array:
@@ -275,7 +293,8 @@ def margin(
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind. If the robot has fewer cables than degrees of freedom.
-            If its motion pattern does not allow the motion from the first pose to another pose.
+            If its motion pattern does not allow the motion from the first pose to another pose. If a cable with mass
+            has a winch on the platform or a pulley with a swivel axis that is not vertical.
 
     Examples:
         >>> import sagline as sl
@@ -297,7 +316,8 @@ def margin(
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
     prepared = MarginRows(robots, load, model, arm)
     rows = pose_rows(pose)
-    check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Divide the poses between several calls.")
+    size = _POSE_BYTES + (8.0 * tables.CABLE_COLUMNS * prepared.cable_count if has_slanted_axes(robots) else 0.0)
+    check_memory(f"margins at {len(rows):,} poses", size * len(rows), "Divide the poses between several calls.")
     found = prepared.rows(rows, report)
     value, low, high, cable, status = (locked(array.reshape(shape)) for array in found[:5])
     direction = locked(found.direction.reshape(*shape, 6))

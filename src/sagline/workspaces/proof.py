@@ -17,6 +17,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.results import Result, Status
 from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN, OUTSIDE, memory_for_proofs, prove_boxes
+from sagline.robot.batch import refuse_slanted
 from sagline.robot.pose import PoseBox
 from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
@@ -343,3 +344,4 @@ def check_provable(robot: Robot) -> None:
         radius = f"{robot.winches.pulley_radius[cable]:g} m"
         step = "Prove the box for the robot without pulleys: robot.replace(winches=None)."
         raise InvalidValueError(f"{robot.name}: pulley_radius[{cable}]", radius, "0 m: proofs have no pulleys", step)
+    refuse_slanted(robot)  # winches on the platform without pulleys
