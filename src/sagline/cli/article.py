@@ -99,7 +99,7 @@ def article(
     """
     from sagline.article.report import NAMES, write_article
 
-    Output(opt.DataFiles(folder, table=False), "", NAMES)  # raises an error if a file cannot be written
+    Output(opt.data_files(folder, table=False), "", NAMES)  # raises an error if a file cannot be written
     what = "reproducing the studies of the article"
     with working(what) as line:
 
@@ -128,7 +128,7 @@ def experiment(
     ),
     true: str | None = opt.TRUE,
     seed: int = opt.seed(1),
-    files: opt.DataFiles = opt.DataFiles(),
+    files: opt.Files = opt.data_files(),
 ) -> None:
     """Repeat the article's experiment: home, the ten points of Table 2, home. One page compares the numbers.
 

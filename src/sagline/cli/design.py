@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,19 +15,13 @@ FIGURE: Final = "front"
 MOST_ROWS: Final = 12  # largest number of printed robots; front.csv lists all of them
 
 
-@dataclass(frozen=True)
-class _Files(opt.Files):
-    folder: Path = opt.out(Path("front"))
-    table: bool = False
-
-
 def design(
     robot: str = opt.ROBOT,
     file: Path = opt.argument(opt.NEEDED, "DESIGN", "File with design variables, bounds and goals (design.yaml)."),
     evaluations: str | None = opt.option(
         None, "NUMBER", "Number of robots to evaluate. Default: the number in the file."
     ),
-    files: _Files = _Files(),
+    files: opt.Files = opt.Files(opt.out(Path("front")), table=False),
 ) -> None:
     r"""Search for a better robot. A file states the design variables (anchors, cables, limits) and the goals.
 

@@ -35,7 +35,7 @@ def identify(
     offset: bool = opt.flag(
         False, "Estimate the zero offset of the measured lengths as a further parameter.", "--offset/--no-offset"
     ),
-    files: opt.TableFiles = opt.TableFiles(),
+    files: opt.Files = opt.TABLE_FILES,
 ) -> None:
     """Estimate the linear density, the axial stiffness and the empirical model of a measured cable.
 

@@ -31,7 +31,7 @@ def examples(folder: Path = opt.out(Path("sagline-examples")), force: bool = opt
     """
     sources = _example_files()
     names = [file.name for file in sources]
-    Output(opt.DataFiles(folder, table=False), "", names)  # raises an error if a file cannot be written
+    Output(opt.data_files(folder, table=False), "", names)  # raises an error if a file cannot be written
     existing = [name for name in names if (folder / name).exists()]
     if existing and not force:
         step = "Choose another folder with --out, or replace it with --force."

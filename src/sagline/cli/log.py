@@ -36,7 +36,7 @@ def log(
     plan: str | None = opt.option(
         None, "NUMBER", "Only the cycles of this plan; numbers start at 0. Default: all cycles.", "--plan-number"
     ),
-    files: opt.TableFiles = opt.TableFiles(),
+    files: opt.Files = opt.TABLE_FILES,
 ) -> int:
     """Print a log of the controller: states, largest errors, late cycles and events.
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from copy import copy
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast, get_type_hints
@@ -152,6 +152,11 @@ def port(default: int) -> int:
     return cast(int, converted(default, "NUMBER", text, whole_of, least=0, most=65535))
 
 
+def table(default: bool, *conditions: Condition) -> bool:
+    """The option `--csv`."""
+    return flag(default, "Write the whole table as a CSV file.", "--csv/--no-csv", *conditions)
+
+
 def if_only(option: T, *conditions: Condition) -> T:
     """A copy of `option` with other conditions."""
     return _with(copy(option), conditions)
@@ -189,7 +194,7 @@ ROBOT = argument(
 OUTPUT = out(Path("output"))
 STDOUT: Path | None = out(None, "stdout")
 JSON = flag(False, "Print only the numbers on stdout, as JSON.", "--json")
-TABLE = flag(False, "Write the whole table as a CSV file.", "--csv/--no-csv")
+TABLE = table(False)
 STYLE: str = choice("plain", "STYLE", "Style of the figures", STYLES)
 FORCE = flag(False, "Replace files that exist.", "--force")
 MODEL: str = choice("catenary", "MODEL", "Cable model", MODELS)
@@ -253,7 +258,7 @@ def _formats_of(text: str, item: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Files:
-    """Options of the files that a command writes. In a subclass, a field without a declaration has a fixed value."""
+    """Options of the files that a command writes. A field that gets a value instead of an option is fixed."""
 
     folder: Path = OUTPUT
     figures: bool = flag(True, "Draw figures.", "--figures/--no-figures")
@@ -270,37 +275,28 @@ class Files:
     as_json: bool = JSON
 
 
-@dataclass(frozen=True)
-class DataFiles(Files):
+def data_files(folder: Path = OUTPUT, *, table: bool = TABLE) -> Files:
     """Options for the output files of a command that draws no figures."""
-
-    figures: bool = False
-    formats: Any = ()
-    style: str = "plain"
+    return Files(folder, figures=False, formats=(), style="plain", table=table)
 
 
-@dataclass(frozen=True)
-class TableFiles(DataFiles):
-    """Options of a command whose only file is a table."""
-
-    folder: Path = if_only(OUTPUT, only_with("--csv"))
+TABLE_FILES: Final = data_files(if_only(OUTPUT, only_with("--csv")))  # of a command whose only file is a table
 
 
 def expanded(function: Callable[..., Any]) -> Callable[..., Any]:
     """A function like `function`, with one parameter per option: the fields of each dataclass replace the dataclass."""
-    hints, groups = get_type_hints(function), dict[str, type[Any]]()
+    hints, groups = get_type_hints(function), dict[str, Any]()
     options: dict[str, Parameter] = {}
     for name, each in signature(function).parameters.items():
-        hint = hints[name]
-        if isinstance(hint, type) and is_dataclass(hint):
-            groups[name] = hint
-            options |= {part.name: part for part in _options_of(hint, each.default)}
+        if is_dataclass(each.default):
+            groups[name] = each.default
+            options |= {part.name: part for part in _options_of(each.default)}
         else:
-            options[name] = each.replace(annotation=hint, kind=Parameter.KEYWORD_ONLY)
+            options[name] = each.replace(annotation=hints[name], kind=Parameter.KEYWORD_ONLY)
 
     def call(**given: Any) -> Any:
         made = {
-            name: group(**{each.name: given.pop(each.name) for each in fields(group) if each.name in options})
+            name: replace(group, **{part.name: given.pop(part.name) for part in _options_of(group)})
             for name, group in groups.items()
         }
         return function(**given, **made)
@@ -316,11 +312,9 @@ def with_defaults(group: type[T]) -> T:
     return group(**{name: each.default for name, each in declared.items()})
 
 
-def _options_of(group: type[Any], defaults: Any) -> Iterator[Parameter]:
-    """Parameters for the declared fields of `group`. The values of the instance `defaults` are the default values."""
-    hints = get_type_hints(group)
-    for each in fields(group):
-        if isinstance(each.default, ParameterInfo):
-            declared, value = copy(each.default), getattr(defaults, each.name)
-            declared.default = declared.default if value is each.default else value
-            yield Parameter(each.name, Parameter.KEYWORD_ONLY, default=declared, annotation=hints[each.name])
+def _options_of(group: Any) -> Iterator[Parameter]:
+    """Parameters for the options in the fields of `group`; a field with another value has no parameter."""
+    hints = get_type_hints(type(group))
+    for name, hint in hints.items():
+        if isinstance(declared := getattr(group, name), ParameterInfo):
+            yield Parameter(name, Parameter.KEYWORD_ONLY, default=declared, annotation=hint)

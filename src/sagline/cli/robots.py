@@ -25,7 +25,7 @@ WHOLE = (  # the other fields of the robot, in the order of the list
 CABLES = "-cables.csv"
 
 
-def robots(files: opt.TableFiles = opt.TableFiles()) -> None:
+def robots(files: opt.Files = opt.TABLE_FILES) -> None:
     """List the preset robots."""
     output = Output(files, "robots", (), (), ".csv")
     robots = [sl.load_robot(name) for name in sl.robot_names()]
@@ -49,7 +49,7 @@ def robots(files: opt.TableFiles = opt.TableFiles()) -> None:
     output.show()
 
 
-def show(name: str = opt.ROBOT, files: opt.TableFiles = opt.TableFiles()) -> None:
+def show(name: str = opt.ROBOT, files: opt.Files = opt.TABLE_FILES) -> None:
     """Show every value of a robot with its unit. Assumed values have a mark and a reason. --csv writes the cables.
 
     For example:

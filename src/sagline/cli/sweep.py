@@ -53,7 +53,7 @@ def sweep(
     count = None if workers is None else opt.whole_of(workers, "--workers", 1, MOST_WORKERS)
     request = sl.load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
-    Output(opt.DataFiles(folder, table=False), "", ["done"])  # raises an error if the folder cannot be written
+    Output(opt.data_files(folder, table=False), "", ["done"])  # raises an error if the folder cannot be written
     parent = folder.absolute().parent
     made = [place for place in (parent, *parent.parents) if not place.exists()]
     create_folder(parent)

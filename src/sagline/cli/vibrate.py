@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -30,11 +29,6 @@ LOWEST = 3  # number of the lowest modes, which are always printed
 FIGURES = ("frequency", "peak")  # figures of a map
 WITHOUT_MAP = opt.only_without("--map")
 TABLE, MAP = "-modes.csv", "-vibration-map.nc"
-
-
-@dataclass(frozen=True)
-class _Files(opt.Files):
-    table: bool = opt.if_only(opt.TABLE, WITHOUT_MAP)
 
 
 def vibrate(
@@ -65,7 +59,7 @@ def vibrate(
     tension: str = opt.TENSION,
     wrench: Any = opt.if_only(opt.WRENCH, WITHOUT_MAP),
     payload: float | None = opt.PAYLOAD,
-    files: _Files = _Files(table=True),
+    files: opt.Files = opt.Files(table=opt.table(True, WITHOUT_MAP)),
 ) -> int:
     """Find all natural frequencies at a pose: those of the platform, and those of the cables, which vibrate as strings.
 
