@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.core.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices, blocks
 
 FLAT = 1e-9  # surfaces and lines with a smaller extent, relative to the picture's size, hide nothing
 TOUCHING = 1e-6  # a line this close to a surface is on it, not behind it; relative to the picture's size
@@ -36,17 +36,6 @@ class FlatLine(NamedTuple):
 _Piece = tuple[Array, float, int, int]
 
 
-class _Covers(NamedTuple):
-    """R flat convex pieces, as `_Piece`, that hide lines behind them. The K limits of a piece are its sides."""
-
-    normals: Array  # outward normals of the limits in the picture, shape (R, K, 2)
-    offsets: Array  # largest products of each normal and a position in the piece, shape (R, K)
-    planes: Array  # coefficients of the depth, which is planes[:, :2] times position plus planes[:, 2], shape (R, 3)
-    behind: Array  # shape (R,)
-    owners: Indices  # shape (R,)
-    hides: Indices  # shape (R,)
-
-
 def view_axes(azimuth: float, elevation: float) -> Array:
     """Unit vectors to the right, up and toward the viewer, in world axes, as the rows of a matrix."""
     around, above = np.array([np.cos(azimuth), np.sin(azimuth)]), np.array([np.cos(elevation), np.sin(elevation)])
@@ -66,10 +55,8 @@ def visible_parts(
     starts = np.concatenate([line.points[:-1] for line in lines])
     ends = np.concatenate([line.points[1:] for line in lines])
     owners = np.repeat(np.arange(len(lines)), [len(line.points) - 1 for line in lines])
-    covers = _covers(lines, [*surfaces, *over], _crossings(lines, starts, ends, owners), size)
-    at_once = max(1, CHUNK // max(covers.offsets.size, 1))
-    blocks = (slice(first, first + at_once) for first in range(0, len(starts), at_once))
-    hidden = [spans for part in blocks for spans in _hidden(starts[part], ends[part], owners[part], covers)]
+    pieces = [*_pieces_of(lines, [*surfaces, *over], size), *_crossings(lines, starts, ends, owners)]
+    hidden = _hidden(starts, ends, owners, pieces)
     found: list[list[Array]] = [[] for _ in lines]
     for start, end, owner, spans in zip(starts, ends, owners, hidden, strict=True):
         for low, high in _rest(spans):
@@ -92,44 +79,47 @@ def _rest(spans: Array) -> list[tuple[float, float]]:
     return [*left, (reached, 1.0)] if reached < 1.0 else left
 
 
-def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
+def _hidden(starts: Array, ends: Array, owners: Indices, pieces: Sequence[_Piece]) -> list[Array]:
     """Hidden spans (n, 2) of each of S segments, in numbers from 0 at the start of a segment to 1 at its end."""
-    # In a hidden span, the segment is within all limits and behind the plane: K + 1 linear functions are <= 0.
-    steps = ends - starts
-    outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
-    rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
-    depth = starts[:, :2] @ covers.planes[:, :2].T + covers.planes[:, 2]
-    before = (starts[:, 2:] - depth + covers.behind)[..., None]
-    nearer = (steps[:, 2:] - steps[:, :2] @ covers.planes[:, :2].T)[..., None]
-    value, slope = np.concatenate((outside, before), axis=2), np.concatenate((rise, nearer), axis=2)
-    crossed = np.divide(-value, slope, out=np.zeros_like(value), where=slope != 0.0)
-    low = np.where(slope < 0.0, crossed, 0.0).max(axis=2, initial=0.0)
-    high = np.where(slope > 0.0, crossed, 1.0).min(axis=2, initial=1.0)
-    never = ((slope == 0.0) & (value > 0.0)).any(axis=2) | (owners[:, None] == covers.owners)
-    never |= (covers.hides >= 0) & (covers.hides != owners[:, None])
-    there = (low < high) & ~never
-    return [np.column_stack((low[s, there[s]], high[s, there[s]])) for s in range(len(starts))]
+    # The K limits of a piece are its sides: products of their outward normals with a position are at most `offsets`.
+    corners = np.array([piece[0] for piece in pieces]).reshape(-1, 4, 3)
+    behind, hiders, hides = (np.array([piece[k] for piece in pieces]) for k in (1, 2, 3))
+    along = np.roll(corners[..., :2], -1, axis=1) - corners[..., :2]
+    normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # outward if the corners are counter-clockwise
+    offsets = np.einsum("rkc,rkc->rk", normals, corners[..., :2])
+    planes = np.array([_plane(each) for each in corners]).reshape(-1, 3)
+    found: list[Array] = []
+    for part in blocks(len(starts), max(1, CHUNK // max(offsets.size, 1))):
+        # In a hidden span, the segment is within all limits and behind the plane: K + 1 linear functions are <= 0.
+        start, step, owner = starts[part], ends[part] - starts[part], owners[part, None]
+        outside = np.einsum("sc,rkc->srk", start[:, :2], normals) - offsets
+        rise = np.einsum("sc,rkc->srk", step[:, :2], normals)
+        depth = start[:, :2] @ planes[:, :2].T + planes[:, 2]
+        before = (start[:, 2:] - depth + behind)[..., None]
+        nearer = (step[:, 2:] - step[:, :2] @ planes[:, :2].T)[..., None]
+        value, slope = np.concatenate((outside, before), axis=2), np.concatenate((rise, nearer), axis=2)
+        crossed = np.divide(-value, slope, out=np.zeros_like(value), where=slope != 0.0)
+        low = np.where(slope < 0.0, crossed, 0.0).max(axis=2, initial=0.0)
+        high = np.where(slope > 0.0, crossed, 1.0).min(axis=2, initial=1.0)
+        never = ((slope == 0.0) & (value > 0.0)).any(axis=2) | (owner == hiders)
+        never |= (hides >= 0) & (hides != owner)
+        there = (low < high) & ~never
+        found += [np.column_stack((low[s, there[s]], high[s, there[s]])) for s in range(len(start))]
+    return found
 
 
-def _covers(lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Piece], size: float) -> _Covers:
-    """All pieces that hide lines: surfaces, strips along lines, and wider strips at crossings."""
+def _pieces_of(lines: Sequence[FlatLine], surfaces: Sequence[Array], size: float) -> list[_Piece]:
+    """Pieces that hide lines: surfaces, and strips along lines."""
     pieces: list[_Piece] = []
     for number, line in enumerate(lines):
         long = np.linalg.norm(np.diff(line.points[:, :2], axis=0), axis=1) > FLAT * size
         if line.half_width > 0.0:
             for start, end in zip(line.points[:-1][long], line.points[1:][long], strict=True):
                 pieces.append((_strip(start, end, line.half_width), line.half_width + line.gap, number, -1))
-    pieces += crossings
     for surface in surfaces:
         if abs(area := _area(surface)) > FLAT * size**2:
             pieces.append((surface if area > 0.0 else surface[::-1], TOUCHING * size, -1, -1))
-    corners = np.array([piece[0] for piece in pieces]).reshape(-1, 4, 3)
-    behind, owners, hides = (np.array([piece[k] for piece in pieces]) for k in (1, 2, 3))
-    along = np.roll(corners[..., :2], -1, axis=1) - corners[..., :2]
-    normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # outward if the corners are counter-clockwise
-    offsets = np.einsum("rkc,rkc->rk", normals, corners[..., :2])
-    planes = np.array([_plane(each) for each in corners]).reshape(-1, 3)
-    return _Covers(normals, offsets, planes, behind, owners, hides)
+    return pieces
 
 
 def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: Indices) -> list[_Piece]:
