@@ -145,16 +145,16 @@ def test_a_chunk_is_closed_every_second_and_is_in_the_file_at_once(tmp_path: Pat
         handed = time.monotonic()
         for cycle in cycles:
             recorder.cycle(cycle)
-        while not reader.log.blocks:
+        while not reader.blocks:
             assert time.monotonic() < handed + 5.0
             time.sleep(0.02)
             reader.more()
         waited = time.monotonic() - handed
     assert waited < 1.2  # the machine of the tests can be slow
-    assert not reader.log.complete
-    assert len(reader.log.blocks[0]["time"]) == 7
+    assert not reader.complete
+    assert len(reader.blocks[0]["time"]) == 7
     reader.more()
-    assert reader.log.complete
+    assert reader.complete
 
 
 VICTIM = """

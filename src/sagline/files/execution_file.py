@@ -17,7 +17,7 @@ from sagline.core.arguments import brief, file_path, instance, integer
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, ROWS, TIME, columns_of
-from sagline.files.mcap_reader import AGAIN, RecordedLog, read_log
+from sagline.files.mcap_reader import AGAIN, LogReader, read_log
 from sagline.files.mcap_writer import BLOCK, McapFile, check_packages
 from sagline.files.netcdf import Format, index_coordinate, write_dataset
 from sagline.files.packed import unpack_dataset
@@ -65,7 +65,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
     return _execution_of_log(log, plan)
 
 
-def _execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
+def _execution_of_log(log: LogReader, plan: int | None = None) -> Execution:
     count = len(log.plans)
     chosen = None if plan is None else integer(plan)
     if plan is not None and (chosen is None or not -count <= chosen < count):
@@ -84,7 +84,7 @@ def _execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
         raise FileError(log.path, f"is inconsistent ({error})", AGAIN) from None
 
 
-def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[Any]]], number: int | None) -> Execution:
+def _execution(log: LogReader, robot: Robot, blocks: list[dict[str, NDArray[Any]]], number: int | None) -> Execution:
     columns = {quantity.name: _column(quantity, blocks) for quantity in EVERY}
     _check_shapes(columns, robot)
     found = {quantity.place: locked(columns[quantity.name]) for quantity in EVERY}
@@ -106,7 +106,7 @@ def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[An
     )
 
 
-def plan_of_log(log: RecordedLog, number: int) -> Plan:
+def plan_of_log(log: LogReader, number: int) -> Plan:
     """Read the plan with the index `number` from a log."""
     data = unpack_dataset(log.plans[number])
     return plan_of_dataset(log.path, data, f"robot of plan {number}")

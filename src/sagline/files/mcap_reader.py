@@ -8,9 +8,7 @@ import re
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from io import BytesIO
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from numpy.typing import NDArray
@@ -49,30 +47,23 @@ class _Truth(NamedTuple):
     quaternion: list[float]  # quaternion, scalar last, four numbers
 
 
-@dataclass(slots=True)
-class RecordedLog:
-    """Content of a log, as far as it has been read."""
-
-    path: Path  # the file
-    robot: Robot | None = None  # the robot; None until it has been read
-    period: float = 0.0  # period of a cycle [s]
-    plans: list[bytes] = field(default_factory=list)  # the plans, packed
-    # end of each plan by the plan's index (-1: no plan): name of its `ExecutionStatus`, and the reason in one line
-    endings: dict[int, tuple[str, str]] = field(default_factory=dict)
-    blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, for each chunk
-    events: list[Event] = field(default_factory=list)  # events in order
-    truth: list[_Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
-    epoch: int = 0  # zero of the log's clock [ns]
-    complete: bool = False  # True if the end of the log has been read
-
-
 class LogReader:
-    """Reader of a log that may still grow; `log` is the content read so far."""
+    """Reader of a log that may still grow, with the content of the log as far as it has been read."""
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
         """Store the path of the file. The method `more` reads the file."""
-        self.log = RecordedLog(file_path(file))
+        self.path = file_path(file)
         check_packages()
+        self.robot: Robot | None = None  # None until it has been read
+        self.period = 0.0  # period of a cycle [s]
+        self.plans: list[bytes] = []  # the plans, packed
+        # end of each plan by the plan's index (-1: no plan): name of its `ExecutionStatus`, and the reason in one line
+        self.endings: dict[int, tuple[str, str]] = {}
+        self.blocks: list[dict[str, NDArray[Any]]] = []  # columns of cycles, for each chunk
+        self.events: list[Event] = []  # in order
+        self.truth: list[_Truth] = []  # true poses of the platform, in the log of a twin
+        self.epoch = 0  # zero of the log's clock [ns]
+        self.complete = False  # True if the end of the log has been read
         self._offset = self._digest = 0
         self._topics: dict[int, str] = {}
 
@@ -88,13 +79,13 @@ class LogReader:
             raise
         except Exception as error:  # any error is caught, because the libraries have no common error for damaged files
             raise self._damaged() from error
-        torn = self._offset - before < len(data) and not self.log.complete
+        torn = self._offset - before < len(data) and not self.complete
         if torn and data.endswith(MAGIC) and len(data) > len(MAGIC):
             raise self._damaged()
         return self._offset > before
 
     def _bytes(self) -> bytes:
-        path = self.log.path
+        path = self.path
         with system_errors(path), value_errors(path):
             status = path.stat()
             check_regular(path, status.st_mode)
@@ -109,9 +100,9 @@ class LogReader:
         if data[: len(MAGIC)] == MAGIC:
             return
         if MAGIC.startswith(data):  # the file contains at most the first few bytes
-            raise FileError(self.log.path, "is empty", "It contains no data, or it was cut off at its start.")
+            raise FileError(self.path, "is empty", "It contains no data, or it was cut off at its start.")
         step = "Give a recorded .mcap file, or one of Execution.save."
-        raise FileError(self.log.path, "is not a log in MCAP", step)
+        raise FileError(self.path, "is not a log in MCAP", step)
 
     def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
         """Read all complete records; an incomplete last record is left for the next call."""
@@ -119,7 +110,7 @@ class LogReader:
         start = self._offset
         if not start:
             self._advance(data[:place])
-        while not self.log.complete and place + _HEAD <= len(data):
+        while not self.complete and place + _HEAD <= len(data):
             end = place + _HEAD + int.from_bytes(data[place + 1 : place + _HEAD], "little")
             if end > len(data):
                 return
@@ -128,7 +119,7 @@ class LogReader:
                 said = int.from_bytes(record[_HEAD : _HEAD + 4], "little")
                 if said and said != self._digest:
                     raise ValueError("wrong digest")
-                self.log.complete = True
+                self.complete = True
             yield code, record
             self._advance(record)
             place = end
@@ -138,7 +129,7 @@ class LogReader:
         self._digest = zlib.crc32(read, self._digest)
 
     def _take(self, code: int, record: bytes) -> None:
-        if code not in (_CHUNK, _ATTACHMENT) or (code == _CHUNK and self.log.robot is None):
+        if code not in (_CHUNK, _ATTACHMENT) or (code == _CHUNK and self.robot is None):
             return  # a sagline log begins with its robot
         from mcap.records import Attachment, Chunk
         from mcap.stream_reader import StreamReader
@@ -170,39 +161,38 @@ class LogReader:
 
     def _attached(self, name: str, epoch: int, data: bytes) -> None:
         if name == HEAD:
-            self.log.epoch = epoch
+            self.epoch = epoch
             self._begin(json.loads(data))
         elif match := _PLAN_NAME.fullmatch(name):
-            if int(match[1]) != len(self.log.plans):
+            if int(match[1]) != len(self.plans):
                 raise ValueError("a plan is missing")
-            self.log.plans.append(data)
+            self.plans.append(data)
         elif match := _END_NAME.fullmatch(name):
             said = json.loads(data)
-            self.log.endings[-1 if match[1] == "none" else int(match[1])] = said["status"], str(said["reason"])
+            self.endings[-1 if match[1] == "none" else int(match[1])] = said["status"], str(said["reason"])
 
     def _begin(self, said: dict[str, Any]) -> None:
-        check_version(self.log.path, said["sagline_log_format"], FORMAT, said["source"])
-        self.log.period = float(said["period"])
-        self.log.robot = parse_robot(said["robot"], f"{self.log.path}, robot")
+        check_version(self.path, said["sagline_log_format"], FORMAT, said["source"])
+        self.period = float(said["period"])
+        self.robot = parse_robot(said["robot"], f"{self.path}, robot")
 
     def _message(self, topic: str, stamp: int, number: int, data: bytes) -> None:
-        log = self.log
-        if log.robot is None:
+        if self.robot is None:
             return
         if topic == RECORD:
-            if number != len(log.blocks):
+            if number != len(self.blocks):
                 raise ValueError("a chunk is missing")
-            log.blocks.append(block := unpack(data, _LARGEST))
+            self.blocks.append(block := unpack(data, _LARGEST))
             if lacking := _NEEDED - block.keys():
-                raise FileError(self.log.path, f"is inconsistent (no {min(lacking)})", AGAIN)
+                raise FileError(self.path, f"is inconsistent (no {min(lacking)})", AGAIN)
         elif topic == EVENT:
-            log.events.append(_event_of(data))
+            self.events.append(_event_of(data))
         elif topic == TRUTH:
             said = json.loads(data)
-            log.truth.append(_Truth(stamp, float(said["time"]), said["position"], said["quaternion"]))
+            self.truth.append(_Truth(stamp, float(said["time"]), said["position"], said["quaternion"]))
 
     def _damaged(self) -> FileError:
-        return FileError(self.log.path, f"is damaged at byte {self._offset:,}", AGAIN)
+        return FileError(self.path, f"is damaged at byte {self._offset:,}", AGAIN)
 
 
 def _event_of(text: bytes) -> Event:
@@ -236,11 +226,10 @@ def _content_of(chunk: Any) -> bytes:
     return bytes(data)
 
 
-def read_log(file: os.PathLike[str] | str) -> RecordedLog:
+def read_log(file: os.PathLike[str] | str) -> LogReader:
     """Read the content of a complete log, or of a log that was cut off."""
-    reader = LogReader(file)
-    reader.more()
-    log = reader.log
+    log = LogReader(file)
+    log.more()
     if log.robot is None and log.complete:
         raise FileError(log.path, "is an MCAP file, but not a log of sagline", "Check that this is the file you mean.")
     if log.robot is None:

@@ -17,7 +17,7 @@ from sagline.core.arrays import Array, Codes
 from sagline.core.numbers import n
 from sagline.files.execution_file import plan_of_log
 from sagline.files.mcap_layout import NANO
-from sagline.files.mcap_reader import LogReader, RecordedLog
+from sagline.files.mcap_reader import LogReader
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.player import InMotion, Played
@@ -165,24 +165,14 @@ class LogFollower:
 
     def __init__(self, file: os.PathLike[str] | str, truth: os.PathLike[str] | str | None = None) -> None:
         """Open the log and the log of the twin."""
-        self._reader = LogReader(file)
+        self.log = LogReader(file)  # the part of the log that was read
         self._truth = None if truth is None else LogReader(truth)
         self._parts: list[dict[str, Any]] = []
         self._plans: dict[int, tuple[Array, Array, Array]] = {}  # times, positions and quaternions
 
-    @property
-    def log(self) -> RecordedLog:
-        """The part of the log that was read."""
-        return self._reader.log
-
-    @property
-    def robot(self) -> Robot | None:
-        """The robot of the log; None before it is read."""
-        return self._reader.log.robot
-
     def more(self) -> PlayedLog | None:
         """Read new cycles. Returns the whole log, or None if there are no new cycles."""
-        grown = self._reader.more()
+        grown = self.log.more()
         if self._truth is not None and self._truth.more():
             grown = True
         log = self.log
@@ -220,7 +210,7 @@ class LogFollower:
         return PlayedLog(robot=robot, began=began, true=true, true_quaternion=turned, events=events, **whole)
 
     def _true(self, stamp: Any) -> tuple[Array | None, Array | None]:
-        truth = [] if self._truth is None else self._truth.log.truth
+        truth = [] if self._truth is None else self._truth.truth
         if not truth:
             return None, None
         start = truth[0].stamp
