@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose
 import sagline as sl
 from sagline import Surface
 from sagline.files import mesh_file
-from sagline.files.mesh_file import save as save_surface
 from tests.interference.scenes import box_mesh
 from tests.refusal import refused
 
@@ -48,18 +47,6 @@ def test_stl_has_no_degenerate_triangles_after_rounding(distance: float, tmp_pat
     assert isinstance(read, trimesh.Trimesh)
     assert len(read.faces) == 4
     assert read.is_watertight
-
-
-@pytest.mark.parametrize("ending", ["glb", "ply"])
-def test_vertices_have_colors(ending: str, tmp_path: Path) -> None:
-    import trimesh
-
-    colors = np.random.default_rng(2).integers(0, 256, (len(SURFACE.vertices), 3))
-    save_surface(SURFACE, tmp_path / f"hull.{ending}", colors)
-    read = trimesh.load_mesh(tmp_path / f"hull.{ending}", process=False)
-    assert isinstance(read, trimesh.Trimesh)
-    assert isinstance(read.visual, trimesh.visual.ColorVisuals)
-    assert_allclose(np.asarray(read.visual.vertex_colors)[:, :3], colors)
 
 
 @pytest.mark.parametrize("ending", ["vtk", "vtu"])
@@ -111,9 +98,6 @@ def test_errors_are_reported_and_the_existing_file_is_unchanged(
     assert f"{tmp_path / 'none'}" in caught.value.next_step
     with refused("surface", "empty", kind=sl.InvalidValueError):
         Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)).export(tmp_path / "hull.stl")
-    for wrong in ([[0, 0, 300]], np.zeros((len(SURFACE.vertices), 3)), np.full((len(SURFACE.vertices), 3), 256)):
-        with refused("colors", kind=sl.InvalidValueError):
-            save_surface(SURFACE, tmp_path / "hull.ply", wrong)
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with refused(kind=sl.FileError, file="package trimesh") as caught:
         SURFACE.export(tmp_path / "hull.stl")

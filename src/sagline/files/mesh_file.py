@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from sagline.core.arguments import brief, file_path, label
 from sagline.core.arrays import Array, Indices
@@ -131,21 +130,19 @@ def _first_crossing(mesh: Mesh) -> Array | None:
     return None if not apart.any() else np.array(result.contacts[int(np.argmax(apart))].pos)
 
 
-def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
+def save(surface: Surface, file: Path | str) -> None:
     """Write a surface to a file atomically, in meters."""
     # file: the suffix selects the format: .stl, .glb (y up, as this format requires), .ply, .vtk or .vtu (the last two
-    # need meshio or PyVista). An existing file is replaced colors: red, green, blue of each vertex, 0 to 255, shape (V,
-    # 3); only GLB and PLY store them
+    # need meshio or PyVista). An existing file is replaced
     target = file_path(file)
     ending = target.suffix.lower()
     if ending not in ENDINGS:
         raise FileError(target, "has a suffix that is not a format for surfaces", f"Use {', '.join(ENDINGS)}.")
     if not len(surface.faces):
         raise InvalidValueError("surface", "empty", "a surface with triangles", "Search the set in another box.")
-    tints = None if colors is None else _check_colors(colors, len(surface.vertices))
     check_file(target)
     if ending not in _VTK:
-        content = _by_trimesh(surface, ending[1:], tints)
+        content = _by_trimesh(surface, ending[1:])
         with atomic_file(target) as partial:
             partial.write_bytes(content)
         return
@@ -157,15 +154,7 @@ def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) ->
         write(surface, partial, ending)
 
 
-def _check_colors(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
-    given = np.asarray(colors)
-    if given.shape != (count, 3) or given.dtype.kind not in "ui" or given.min() < 0 or given.max() > 255:
-        found = f"of {given.dtype}, shape {given.shape}"
-        raise InvalidValueError("colors", found, f"integers 0 to 255, shape ({count}, 3)", "Give red, green, blue.")
-    return given.astype(np.uint8)
-
-
-def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -> bytes:
+def _by_trimesh(surface: Surface, kind: str) -> bytes:
     with needed_packages("Surfaces need it", "workspace"):
         import trimesh
     vertices, faces = surface.vertices, surface.faces
@@ -173,9 +162,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
         vertices, faces = _in_single_precision(vertices, faces)
     if kind == "glb":
         vertices = np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
-    shades: Any = None if colors is None else np.column_stack([colors, np.full(len(colors), 255, dtype=np.uint8)])
-    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=shades, process=False)
-    return bytes(mesh.export(file_type=kind))  # type: ignore[arg-type]
+    return bytes(trimesh.Trimesh(vertices, faces, process=False).export(file_type=kind))  # type: ignore[arg-type]
 
 
 def _in_single_precision(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
