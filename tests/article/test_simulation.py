@@ -12,11 +12,12 @@ from tests.article.hanging import length_and_force
 
 @pytest.fixture(scope="module")
 def study() -> PathStudy:
-    return path_study(rate=20.0)
+    return path_study(sl.article_path(20.0))
 
 
 def test_tensions_of_the_mixed_robot_are_about_twice_as_high(study: PathStudy) -> None:
-    assert study.tension_ratio == pytest.approx(2.0755, abs=0.002)
+    suspended, mixed = (figures(run) for run in study[sl.Empirical])
+    assert mixed.tension_max / suspended.tension_max == pytest.approx(2.0755, abs=0.002)
 
 
 @pytest.mark.parametrize(
@@ -31,7 +32,7 @@ def test_tensions_of_the_mixed_robot_are_about_twice_as_high(study: PathStudy) -
 def test_each_models_position_error_in_millimeters(
     study: PathStudy, kind: type[sl.CableModel], suspended: float, mixed: float
 ) -> None:
-    for run, expected in zip(study.of(kind), (suspended, mixed), strict=True):
+    for run, expected in zip(study[kind], (suspended, mixed), strict=True):
         found = figures(run)
         assert 1e3 * found.error_max == pytest.approx(expected, rel=0.01)
         assert found.held == 1.0
@@ -39,26 +40,27 @@ def test_each_models_position_error_in_millimeters(
 
 
 def test_the_exact_model_has_no_error(study: PathStudy) -> None:
-    assert max(figures(run).error_max for run in study.of(sl.Catenary)) < 1e-11
+    assert max(figures(run).error_max for run in study[sl.Catenary]) < 1e-11
 
 
 def test_the_empirical_model_stays_within_the_articles_band(study: PathStudy) -> None:
-    for run in study.of(sl.Empirical):
+    for run in study[sl.Empirical]:
         found = figures(run)
         assert found.axis_error_max < ERROR_BAND / 4.0
         assert found.axis_error_max == np.abs(run.position_error).max()
 
 
 def test_tensions_are_continuous_with_corners_that_do_not_grow() -> None:
-    coarse, fine = (path_study(rate=rate, models=[sl.Empirical()]) for rate in (25.0, 100.0))
-    for slow, fast in zip(coarse.of(sl.Empirical), fine.of(sl.Empirical), strict=True):
+    coarse, fine = (path_study(sl.article_path(rate), [sl.Empirical()]) for rate in (25.0, 100.0))
+    for slow, fast in zip(coarse[sl.Empirical], fine[sl.Empirical], strict=True):
         assert figures(fast).step_max < 0.3 * figures(slow).step_max
         assert figures(fast).slope_jump < figures(slow).slope_jump * 1.05
 
 
 def test_steps_slopes_and_corners_by_hand(study: PathStudy) -> None:
-    for run in study.of(sl.Empirical):
-        time, tension = study.path.time, run.plan.horizontal_tension
+    time = sl.article_path(20.0).time
+    for run in study[sl.Empirical]:
+        tension = run.plan.horizontal_tension
         steps, slopes, corners = [], [], []
         for i in range(tension.shape[1]):
             slope = [(tension[k + 1, i] - tension[k, i]) / (time[k + 1] - time[k]) for k in range(len(time) - 1)]

@@ -57,7 +57,7 @@ def test_the_empirical_model_is_not_the_cause(study: TenPoses) -> None:
 def test_the_platform_is_too_high_at_low_positions(study: TenPoses) -> None:
     slope, _ = np.polyfit(study.table.desired[:, 2], study.table.error[:, 2], 1)
     assert 1e3 * slope == pytest.approx(-18.17, abs=0.01)
-    assert study.height_line.slope == pytest.approx(slope, rel=1e-12)
+    assert study.height_slope(study.table.error) == pytest.approx(1e3 * slope, rel=1e-12)
     assert (study.table.error[:, 2] > 0.0).all()
 
 

@@ -166,7 +166,7 @@ DRAWN = (1, 3, 5, 7, 9)  # indices of the densities that are drawn
 
 def sag_chapter() -> Chapter:
     """Chapter about the regressions that lead from the adjusting length to k_p."""
-    end = fits.End.at_angle(CHORD)
+    end = fits.end_at_angle(CHORD)
     stiff, soft, printed, right = fits.stretch_study(fits.simulated_cable(), end, TENSIONS)
     sag = fits.sag_study(fits.published_sampling())
     fitted = [find(sag) for find in (_tension, _chord, _angle, _density)]

@@ -149,10 +149,9 @@ def _largest(vector: Array) -> float:
 def _stretch_by_end_tension() -> Sequence[Number]:
     """Erratum 5: equation (36) computes the elongation with the tension at B instead of the mean tension."""
     cable = fits.simulated_cable()
-    end = fits.End.at_angle(LONG)
-    stiff, soft, printed, right = fits.stretch_study(cable, end, np.array([500.0]))
+    stiff, soft, printed, right = fits.stretch_study(cable, fits.end_at_angle(LONG), np.array([500.0]))
     excess = float((printed - right)[0])
-    length = end.chord + float(soft.adjusting_length[0])
+    length = LONG + float(soft.adjusting_length[0])
     formula = float(
         cable.linear_density * fits.GRAVITY * length**2 * np.sin(fits.ANGLE) / (2.0 * cable.axial_stiffness)
     )
@@ -184,7 +183,7 @@ def _sign_in_bound() -> Sequence[Number]:
     from scipy.optimize import brentq
 
     cable, chord = fits.simulated_cable(), 10.0
-    span, rise = fits.End.at_angle(chord) * np.array([1.0, -1.0])
+    span, rise = fits.end_at_angle(chord) * np.array([1.0, -1.0])
     slope, intercept = rise / span, 0.5 * float(cable.linear_density) * fits.GRAVITY * chord
 
     def vertical(tension: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.article.drawing import axes, chapter, finding, shades
-from sagline.article.regressions import ANGLE, GRAVITY, End, FittedLine, fit_line, simulated_cable
+from sagline.article.regressions import ANGLE, GRAVITY, End, end_at_angle, fit_line, simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
@@ -35,17 +35,17 @@ class _FeasibleSets:
     tensions: Array  # T_x along the curve Psi [N], shape (t,)
     vertical: Array  # T_z along the curve Psi [N], shape (t,)
     lengths: Array  # L along the curve Psi [m], shape (t,)
-    line: FittedLine  # least-squares line pi through the points (T_x, T_z): slope a_pi, intercept b_pi [N]
+    line: tuple[Array, Array]  # slope a_pi and intercept b_pi [N] of the line pi through the points (T_x, T_z)
 
     @property
     def tangent(self) -> float:
         """Slope tan phi of the line pi according to equation (26) of the article."""
-        return self.end.rise / self.end.span
+        return self.end[1] / self.end[0]
 
     @property
     def half_weight(self) -> float:
         """Magnitude w D/2 of the intercept according to equation (28) of the article: half of the weight [N]."""
-        return 0.5 * float(self.cable.linear_density) * GRAVITY * self.end.chord
+        return 0.5 * float(self.cable.linear_density) * GRAVITY * float(np.hypot(*self.end))
 
 
 def feasible_sets(
@@ -57,9 +57,9 @@ def feasible_sets(
     # Source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
     if points % 4:
         raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
-    model, stretch = sl.Catenary(), end.chord / end.span
-    curve = model.from_tension(cable, end.span, end.rise, tensions * stretch, GRAVITY)
-    lengths = model.from_tension(cable, end.span, end.rise, psi_tensions * stretch, GRAVITY).unstrained_length
+    model, stretch = sl.Catenary(), np.hypot(*end) / end[0]
+    curve = model.from_tension(cable, *end, tensions * stretch, GRAVITY)
+    lengths = model.from_tension(cable, *end, psi_tensions * stretch, GRAVITY).unstrained_length
     outline = np.asarray(end) + tolerance * _diamond(points)
     around = model.from_length(cable, outline[:, 0], outline[:, 1], lengths[:, None], GRAVITY)
     psi = np.stack((around.horizontal_tension, around.vertical_force), axis=-1)
@@ -76,7 +76,7 @@ def _diamond(points: int) -> Array:
 
 def feasible_chapter() -> Chapter:
     """Chapter about the tensions for which the end of a cable is at a point, exactly or within a tolerance."""
-    end = End.at_angle(CHORD)
+    end = end_at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     return chapter("feasible-sets", (_psi(studies), _curve(studies[0]), _line(studies[0])), chord=CHORD, angle=ANGLE)
 
@@ -135,15 +135,13 @@ def _curve(study: _FeasibleSets) -> Finding:
 
 
 def _line(study: _FeasibleSets) -> Finding:
-    line = study.line
-    rest = study.vertical - (line.slope * study.tensions + line.intercept)
+    slope, intercept = study.line
+    rest = study.vertical - (slope * study.tensions + intercept)
     taut = study.tensions >= LOW_PART
     from_article = study.vertical - (study.tangent * study.tensions + study.half_weight)
     figure, ax = axes("$T_x$ [N]", "$T_z$ [N]")
     ax.plot(study.tensions, study.vertical, color=BLUE, linewidth=2.4, alpha=0.5, label="exact")
-    ax.plot(
-        study.tensions, line.slope * study.tensions + line.intercept, color="black", linewidth=0.9, label=r"line $\pi$"
-    )
+    ax.plot(study.tensions, study.vertical - rest, color="black", linewidth=0.9, label=r"line $\pi$")
     second, bx = axes("$T_x$ [N]", "away from the line [N]")
     bx.plot(study.tensions, rest, color=BLUE, linewidth=1.3, label=r"fitted line")
     bx.plot(study.tensions, from_article, color=VERMILLION, linewidth=1.3, label=r"$\tan\varphi\, T_x + wD/2$")
@@ -151,12 +149,12 @@ def _line(study: _FeasibleSets) -> Finding:
     return finding(
         "line-pi",
         numbers={
-            "r_squared": line.r_squared,
-            "slope": line.slope,
+            "r_squared": np.corrcoef(study.tensions, study.vertical)[0, 1] ** 2,
+            "slope": slope,
             "tangent": study.tangent,
-            "intercept_N": line.intercept,
+            "intercept_N": intercept,
             "half_weight_N": study.half_weight,
-            "deviation_N": line.deviation,
+            "deviation_N": _largest(rest),
             "deviation_from_tangent_N": _largest(from_article),
             "taut_from_N": LOW_PART,
             "taut_deviation_from_tangent_N": _largest(from_article[taut]),

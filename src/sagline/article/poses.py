@@ -85,24 +85,25 @@ def _space(study: TenPoses) -> Finding:
     table = study.table
     caption = "The poses in the {}-z plane; areas show the positioning errors."
     panels = error_panels(table.points, table.desired, [("", table.distance, AREA, BLUE)], caption)
-    line, height = study.height_line, table.desired[:, 2]
+    height, rise = table.desired[:, 2], 1e3 * table.error[:, 2]
+    slope, intercept = fit_line(height, rise)
     figure, ax = axes("$z$ desired [m]", "vertical error [mm]")
-    ax.plot(height, 1e3 * table.error[:, 2], "o", color=BLUE, markersize=4.0, label="measured")
+    ax.plot(height, rise, "o", color=BLUE, markersize=4.0, label="measured")
     ends = np.array([height.min(), height.max()])
-    ax.plot(ends, 1e3 * (line.slope * ends + line.intercept), color="black", linewidth=0.9, label="line")
+    ax.plot(ends, slope * ends + intercept, color="black", linewidth=0.9, label="line")
     panels.append((figure, "Actual minus desired height of the platform."))
     tension = study.plan.horizontal_tension.mean(axis=1)
     against = float(np.corrcoef(tension, table.distance)[0, 1])
     return finding(
         "error-in-space",
         numbers={
-            "slope_mm_per_m": 1e3 * line.slope,
-            "r_squared": line.r_squared,
+            "slope_mm_per_m": slope,
+            "r_squared": np.corrcoef(height, rise)[0, 1] ** 2,
             "correlation_with_tension": against,
-            "lowest_vertical_error_mm": 1e3 * table.error[:, 2].min(),
+            "lowest_vertical_error_mm": rise.min(),
         },
         panels=panels,
-        fall=-1e3 * line.slope,
+        fall=-slope,
     )
 
 
@@ -117,16 +118,16 @@ def _trends(study: TenPoses) -> Finding:
     for k, parameter in enumerate(causes.PARAMETERS):
         ax, error = pairs[k // 5][1], study.trends[parameter.name]
         label = f"{parameter.name} {n(parameter.typical, '+g', parameter.unit)}"
-        line = fit_line(height, 1e3 * error[:, 2])
-        course = line.slope * fine + line.intercept
+        slope, intercept = fit_line(height, 1e3 * error[:, 2])
         look = {"color": COLORS[k % 5], "linestyle": LINE_STYLES[k % 5]}
-        ax.plot(fine, course, **look, linewidth=1.2, label=label)
+        ax.plot(fine, slope * fine + intercept, **look, linewidth=1.2, label=label)
         listed.append((label, error, slopes[parameter.name]))
     for _, ax in pairs:
         ax.set_ylim(-25.0, 85.0)
-    listed.append(("measured", study.table.error, float(1e3 * study.height_line.slope)))
+    measured = study.height_slope(study.table.error)
+    listed.append(("measured", study.table.error, measured))
     rows = [(name, *(n(1e3 * z, ".1f") for z in error[:, 2]), n(slope, "+.1f")) for name, error, slope in listed]
-    falling = [name for name, slope in slopes.items() if slope * study.height_line.slope > 1e-6 * abs(slope)]
+    falling = [name for name, slope in slopes.items() if slope * measured > 1e-3 * abs(slope)]
     captions = (
         "Measured vertical errors over height, and trends that single parameters predict.",
         "Trends of the other parameters.",
@@ -138,7 +139,7 @@ def _trends(study: TenPoses) -> Finding:
     )
     return finding(
         "one-parameter-off",
-        numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": 1e3 * study.height_line.slope},
+        numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": measured},
         panels=[(figure, caption) for (figure, _), caption in zip(pairs, captions, strict=True)],
         data=(shown,),
         stiffer=slopes[causes.MODULUS],
@@ -270,7 +271,7 @@ def _single_causes(study: TenPoses) -> Finding:
     ranked = study.explanations[0]
     alone = {found.parameters[0].name: found for found in ranked}
     slopes = {name: study.height_slope(found.predicted) for name, found in alone.items()}
-    measured = 1e3 * float(study.height_line.slope)
+    measured = study.height_slope(study.table.error)
     falling = [name for name in slopes if abs(slopes[name] - measured) <= AS_MEASURED * abs(measured)]
     none = [one.parameters[0].name for one in ranked if one.rms > NOTHING * study.measured_rms]
     pair, low, high = study.best(2), study.table.points.index(LOWEST), study.table.points.index(HIGHEST)
@@ -302,7 +303,7 @@ def _single_causes(study: TenPoses) -> Finding:
 
 def _table_of_classes(study: TenPoses, alone: dict[str, causes.Explanation], slopes: dict[str, float]) -> Table:
     head = ["off", "for example", "mean displacement [mm]", "best value", "slope [mm/m]"]
-    measured = (1e3 * study.height_line.slope, "+.1f"), (1e3 * study.measured_rms, ".1f")
+    measured = (study.height_slope(study.table.error), "+.1f"), (1e3 * study.measured_rms, ".1f")
     return Table(
         "Single imperfections; the best value is the plausible value that agrees best with Table 2",
         [*head, "remaining error, rms [mm]", "remark"],
@@ -325,7 +326,7 @@ def _row(study: TenPoses, found: causes.Explanation, slope: float) -> tuple[str,
 
 
 def _remark(study: TenPoses, found: causes.Explanation, slope: float) -> str:
-    measured = 1e3 * float(study.height_line.slope)
+    measured = study.height_slope(study.table.error)
     if found.rms > NOTHING * study.measured_rms:
         return "explains nothing"
     if abs(slope - measured) <= AS_MEASURED * abs(measured):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,25 +16,11 @@ ANGLE = 0.754  # angle of the article's figure 10 [rad]
 UNSTRETCHABLE = 1e20  # stiffness [N] for which the strain is below the rounding error
 
 
-class FittedLine(NamedTuple):
-    """Least-squares lines y = slope x + intercept through samples along the last axis of arrays."""
-
-    slope: Array  # slope, shape (...)
-    intercept: Array  # intercept, shape (...)
-    r_squared: Array  # coefficient of determination, 1 if all samples are on the line, shape (...)
-    deviation: Array  # largest distance of a sample from the line, in the unit of y, shape (...)
-
-
-def fit_line(x: Array, y: Array) -> FittedLine:
-    """Fit least-squares lines to the samples (`x`, `y`) along the last axis of both arrays."""
-    x, y = np.broadcast_arrays(x, y)
-    away_x = x - x.mean(axis=-1, keepdims=True)
-    away_y = y - y.mean(axis=-1, keepdims=True)
-    slope = np.sum(away_x * away_y, axis=-1) / np.sum(away_x**2, axis=-1)
-    rest = away_y - slope[..., None] * away_x
-    explained = 1.0 - np.sum(rest**2, axis=-1) / np.sum(away_y**2, axis=-1)
-    intercept = y.mean(axis=-1) - slope * x.mean(axis=-1)
-    return FittedLine(slope, intercept, explained, np.abs(rest).max(axis=-1))
+def fit_line(x: Array, y: Array) -> tuple[Array, Array]:
+    """Slopes and intercepts (...) of least-squares lines through the samples `x` (N,) and `y` (..., N)."""
+    away = x - x.mean()
+    slope = np.sum(away * y, axis=-1) / np.sum(away**2)
+    return slope, y.mean(axis=-1) - slope * x.mean()
 
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
@@ -45,21 +31,12 @@ def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
     return np.asarray(np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis))
 
 
-class End(NamedTuple):
-    """Desired position of the platform end of a cable."""
+End: TypeAlias = tuple[float, float]  # platform end of a cable: span and rise from the frame end [m]
 
-    span: float  # horizontal distance from the frame end [m]
-    rise: float  # height above the frame end [m]
 
-    @classmethod
-    def at_angle(cls, chord: float) -> End:
-        """Platform end of a cable with a chord of the length `chord` [m], at the angle of the article."""
-        return cls(chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE)))
-
-    @property
-    def chord(self) -> float:
-        """Length D of the chord [m]."""
-        return float(np.hypot(self.span, self.rise))
+def end_at_angle(chord: float) -> End:
+    """Platform end of a cable with a chord of the length `chord` [m], at the angle of the article."""
+    return chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE))
 
 
 class Sampling(NamedTuple):
@@ -112,7 +89,6 @@ class InterceptStudy:
     """Intercepts b_pi for one end of the cable, and the regressions of the article that lead from b_pi to k_h."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities
-    slope: Array  # slopes a_pi of the fitted lines, shape (a, c, r)
     intercept: Array  # intercepts b_pi of the fitted lines [N], shape (a, c, r)
     h_b: Array  # factor in b_pi = h_b D [N/m], shape (a, r)
     k_h_of_angle: Array  # factor in h_b = k_h rho, fitted for each angle [m/s^2], shape (a,)
@@ -136,12 +112,12 @@ def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStud
 
 
 def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
-    line = fit_line(sampling.tensions, vertical)
-    h_b = fit_factor(sampling.chords[:, None], line.intercept, axis=-2)
+    _, intercept = fit_line(sampling.tensions, vertical)
+    h_b = fit_factor(sampling.chords[:, None], intercept, axis=-2)
     k_h_of_angle = fit_factor(sampling.densities, h_b)
     everywhere = np.broadcast_to(sampling.densities, h_b.shape)
     k_h = float(fit_factor(everywhere.ravel(), h_b.ravel()))
-    return InterceptStudy(sampling, line.slope, line.intercept, h_b, k_h_of_angle, k_h)
+    return InterceptStudy(sampling, intercept, h_b, k_h_of_angle, k_h)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,7 +155,7 @@ def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> tuple[sl.CableS
     # The force at the platform end gives an elongation |T| L/EA that is too large by w L^2 sin(phi)/(2 EA), because the
     # mean force is smaller by half of the weight's part along the chord (erratum 5). Source: Gia Luan & Truong Thinh
     # 2020, (33) to (38), figures 8 and 9
-    model, chord_tension = sl.Catenary(), tensions * end.chord / end.span
+    model, chord_tension = sl.Catenary(), tensions * np.hypot(*end) / end[0]
     stiff = model.from_tension(cable.replace(axial_stiffness=UNSTRETCHABLE), *end, chord_tension, GRAVITY)
     soft = model.from_tension(cable, *end, chord_tension, GRAVITY)
     mean_force = np.hypot(soft.horizontal_tension, soft.vertical_force - 0.5 * soft.cable_weight)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -56,36 +55,17 @@ class _Figures(NamedTuple):
     held: float  # share of poses with a stable equilibrium for the planned lengths
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PathStudy:
-    """Simulation of both robots along the same path with several cable models."""
-
-    path: sl.Path
-    models: tuple[sl.CableModel, ...]
-    suspended: tuple[sl.Confirmation, ...]  # results for the first configuration, one per model
-    mixed: tuple[sl.Confirmation, ...]  # results for the second configuration, one per model
-
-    def of(self, kind: type[sl.CableModel]) -> tuple[sl.Confirmation, sl.Confirmation]:
-        """Results of both robots with the model of the type `kind`."""
-        k = [type(model) for model in self.models].index(kind)
-        return self.suspended[k], self.mixed[k]
-
-    @property
-    def tension_ratio(self) -> float:
-        """Highest T_x of the mixed robot divided by highest T_x of the suspended robot, with the empirical model."""
-        suspended, mixed = (figures(run) for run in self.of(sl.Empirical))
-        return mixed.tension_max / suspended.tension_max
+# results of the first and of the second configuration along the same path, by the type of the cable model
+PathStudy: TypeAlias = dict[type[sl.CableModel], tuple[sl.Confirmation, sl.Confirmation]]
 
 
-def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
+def path_study(path: sl.Path, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
     """Plan both robots along the article's path, and find the equilibria of exact cables with the planned lengths."""
     # The lengths are planned as in the "simple controller" of the article, which computes lengths from tensions. The
     # actual pose is the equilibrium of exact cables with the planned lengths and the same inertial forces.
     # Source: Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
-    path = sl.article_path(rate)
-    runs = [tuple(_run(sl.load_robot(name), path, model, METHOD) for model in models) for name in ROBOTS]
-    suspended, mixed = runs
-    return PathStudy(path, tuple(models), suspended, mixed)
+    suspended, mixed = (sl.load_robot(name) for name in ROBOTS)
+    return {type(model): (_run(suspended, path, model, METHOD), _run(mixed, path, model, METHOD)) for model in models}
 
 
 def low_tension_study(limits: Array, rate: float = 10.0) -> tuple[Array, list[_Figures]]:
@@ -152,14 +132,15 @@ NEAR = 1.05  # a tension is near its minimum if it is less than this multiple of
 
 def simulation_chapter() -> Chapter:
     """Chapter about both robots along the path."""
-    study = path_study()
-    findings = [find(study) for find in (_robots, _path, _courses, _error, _comparison, _models)]
-    return chapter("simulation", [*findings, _low_tension()])
+    path = sl.article_path()
+    study = path_study(path)
+    findings = _robots(study), _path(path), _courses(study), _error(study, path), _comparison(study)
+    return chapter("simulation", [*findings, _models(study, path), _low_tension()])
 
 
 def _robots(study: PathStudy) -> Finding:
     panels = []
-    for run, caption in zip(study.of(sl.Catenary), ("First configuration: suspended.", "Second: mixed."), strict=True):
+    for run, caption in zip(study[sl.Catenary], ("First configuration: suspended.", "Second: mixed."), strict=True):
         figure = Sheet(figsize=(WIDTH, 3.4))
         figure.subplots_adjust(left=0.13, right=0.97, bottom=0.0, top=1.0)
         ax = figure.add_subplot(projection="3d")
@@ -169,8 +150,7 @@ def _robots(study: PathStudy) -> Finding:
     return finding("robots", panels=panels)
 
 
-def _path(study: PathStudy) -> Finding:
-    path = study.path
+def _path(path: sl.Path) -> Finding:
     figure, ax = axes("", "")
     draw_path(path, ax)
     figure.subplots_adjust(bottom=0.16, top=0.92)
@@ -193,7 +173,7 @@ def _path(study: PathStudy) -> Finding:
 
 def _courses(study: PathStudy) -> Finding:
     panels, numbers, texts = [], {}, []
-    for run, robot, figure in zip(study.of(sl.Empirical), ("suspended", "mixed"), (20, 21), strict=True):
+    for run, robot, figure in zip(study[sl.Empirical], ("suspended", "mixed"), (20, 21), strict=True):
         cables, numbers[robot] = run.plan.state.cables, figures(run)._asdict()
         for values, label, what in (
             (cables.unstrained_length, "$L$ [m]", "unstrained length"),
@@ -221,11 +201,11 @@ def _cables(plan: sl.Plan, values: Array, label: str, caption: str) -> Drawing:
     return figure, caption, "cable"
 
 
-def _error(study: PathStudy) -> Finding:
+def _error(study: PathStudy, path: sl.Path) -> Finding:
     panels, found = [], {}
-    for run, robot in zip(study.of(sl.Empirical), ("suspended", "mixed"), strict=True):
+    for run, robot in zip(study[sl.Empirical], ("suspended", "mixed"), strict=True):
         found[robot] = figures(run)
-        panels.append(_error_panel(run, study.path, f"{robot.capitalize()}: empirical model."))
+        panels.append(_error_panel(run, path, f"{robot.capitalize()}: empirical model."))
     inside = all(f.axis_error_max <= ERROR_BAND for f in found.values())
     return finding(
         "position-error",
@@ -247,12 +227,13 @@ def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str) -> Drawing:
 
 
 def _comparison(study: PathStudy) -> Finding:
-    suspended, mixed = study.of(sl.Empirical)
+    suspended, mixed = study[sl.Empirical]
     robot = mixed.plan.state.one_robot
     lower = robot.frame_anchors[:, 2] < robot.frame_anchors[:, 2].mean()
     near = float(np.mean(mixed.plan.chord_tension[:, lower] <= NEAR * robot.tension_min[lower]))
+    pair = figures(suspended), figures(mixed)
     rows = [
-        (label, *(n(scale * getattr(figures(run), field), form) for run in (suspended, mixed)))
+        (label, *(n(scale * getattr(found, field), form) for found in pair))
         for label, field, scale, form in (
             ("highest T_x [N]", "tension_max", 1.0, ".1f"),
             ("lowest T_x [N]", "tension_min", 1.0, ".1f"),
@@ -266,7 +247,7 @@ def _comparison(study: PathStudy) -> Finding:
     return finding(
         "configurations",
         numbers={
-            "tension_ratio": study.tension_ratio,
+            "tension_ratio": pair[1].tension_max / pair[0].tension_max,
             "near_limit_share": NEAR - 1.0,
             "share_of_lower_cables_at_limit": near,
         },
@@ -274,10 +255,10 @@ def _comparison(study: PathStudy) -> Finding:
     )
 
 
-def _models(study: PathStudy) -> Finding:
+def _models(study: PathStudy, path: sl.Path) -> Finding:
     rows, numbers = [], {}
-    for model, first, second in zip(study.models, study.suspended, study.mixed, strict=True):
-        pair, name = (figures(first), figures(second)), type(model).__name__
+    for model, runs in study.items():
+        pair, name = [figures(run) for run in runs], model.__name__
         sizes = [(value, f.length_max) for f in pair for value in (f.error_max, f.error_mean)]
         errors = [n(1e3 * value, ".3g", size=1e3 * longest) for value, longest in sizes]
         highest, held = [n(f.tension_max, ".1f") for f in pair], [n(100 * f.held, ".4g") for f in pair]
@@ -285,13 +266,13 @@ def _models(study: PathStudy) -> Finding:
         numbers[name] = {"suspended_mm": 1e3 * pair[0].error_max, "mixed_mm": 1e3 * pair[1].error_max}
     head = ["model", "max, suspended", "mean", "max, mixed", "mean", "T_x suspended", "T_x mixed"]
     panels = []
-    for robot, runs in (("suspended", study.suspended), ("mixed", study.mixed)):
+    part = thinning(len(path))
+    for k, robot in enumerate(("suspended", "mixed")):
         figure, ax = axes("time [s]", "distance from the plan [mm]")
-        part = thinning(len(study.path))
         ax.set_prop_cycle(linestyle=LINE_STYLES)
-        for model, run, color in zip(study.models[:-1], runs, COLORS, strict=False):
-            distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
-            ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
+        for (model, runs), color in zip(list(study.items())[:-1], COLORS, strict=False):
+            distance = 1e3 * np.linalg.norm(runs[k].position_error[part], axis=1)
+            ax.plot(path.time[part], distance, color=color, linewidth=1.1, label=model.__name__)
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         panels.append((figure, f"Position errors of four models, {robot}; the exact model is the reference."))
     shown = Table(
@@ -303,13 +284,13 @@ def _models(study: PathStudy) -> Finding:
         "five-models",
         numbers={
             "largest_error": numbers,
-            "exact_largest_error_pm": 1e12 * _worst(study.of(sl.Catenary)),
-            "longest_length_m": max(figures(run).length_max for run in study.of(sl.Catenary)),
+            "exact_largest_error_pm": 1e12 * _worst(study[sl.Catenary]),
+            "longest_length_m": max(figures(run).length_max for run in study[sl.Catenary]),
         },
         panels=panels,
         data=(shown,),
-        exact=_worst(study.of(sl.Catenary)),
-        parabolic=_worst(study.of(sl.Parabolic)),
+        exact=_worst(study[sl.Catenary]),
+        parabolic=_worst(study[sl.Parabolic]),
     )
 
 

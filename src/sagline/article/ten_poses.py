@@ -11,7 +11,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.article import explanations as causes
-from sagline.article.regressions import FittedLine, fit_line
+from sagline.article.regressions import fit_line
 from sagline.core.arrays import Array, locked
 from sagline.motion.rest_to_rest import QUINTIC
 
@@ -64,7 +64,6 @@ class TenPoses:
     plan: sl.Plan  # plan of the prototype for the ten poses, with the empirical model
     home: sl.Plan  # plan of the prototype for its home pose
     model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
-    height_line: FittedLine  # least-squares line: measured vertical error as a function of the height of the pose
     # name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3)
     trends: dict[str, Array]
     # all explanations by one parameter, by two and by three parameters; each list is sorted by the remaining error
@@ -78,7 +77,7 @@ class TenPoses:
 
     def height_slope(self, error: Array) -> float:
         """Slope [mm/m] of a line that is fitted to the vertical `error` (10, 3) [m] over the height of the poses."""
-        return float(fit_line(self.table.desired[:, 2], 1e3 * error[:, 2]).slope)
+        return float(fit_line(self.table.desired[:, 2], 1e3 * error[:, 2])[0])
 
     def best(self, count: int) -> causes.Explanation:
         """Explanation by `count` parameters that has the smallest remaining error."""
@@ -107,7 +106,6 @@ def ten_poses() -> TenPoses:
     imitated, single_zero = _limits(robot, error_of, plan, ranked[1][0])
     return TenPoses(
         *(table, plan, home, nominal),
-        height_line=fit_line(table.desired[:, 2], table.error[:, 2]),
         trends={parameter.name: error for parameter, error in zip(causes.PARAMETERS, off, strict=True)},
         explanations=ranked,
         imitated=imitated,
