@@ -13,8 +13,9 @@ import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
 from sagline.calibration.calibrate import _active_sensors
 from sagline.calibration.least_squares import best_step, evaluate_step
+from sagline.calibration.observations import Readings
 from sagline.calibration.parameters import parameters_of, with_values
-from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, start_of
+from sagline.calibration.problem import FitProblem, SearchState, start_of
 from sagline.core.arrays import Array
 from sagline.robot.drum import Drums
 from tests.calibration.synthetic import Truth, true_robot, usual_sensors, with_drums
@@ -33,7 +34,7 @@ def problem_of(log: sl.WinchLog) -> FitProblem:
     """Unknowns of a calibration of CoGiRo with a log."""
     sensors = _active_sensors(log)
     return FitProblem(
-        COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), ReadingsTable.of(log)
+        COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), Readings.of(log)
     )
 
 
@@ -107,12 +108,12 @@ def large() -> Iterator[Row]:
     for rows in (TILED, MILLION):
         times = -(-rows // 60)
         assert small.log.counts is not None
-        silent = small.log.positions[:1], small.log.rotations[:1]
-        tiled = ReadingsTable(
-            np.tile(small.log.counts, (times, 1))[:rows],
-            None,
+        tiled = Readings(
+            np.broadcast_to(np.nan, (rows, small.log.counts.shape[1])),
             np.tile(small.log.cells, (times, 1))[:rows],
-            *(np.broadcast_to(one, (rows, one.shape[1])) for one in silent),
+            np.broadcast_to(small.log.positions[:1], (rows, 3)),
+            np.broadcast_to(small.log.rotations[:1], (rows, 4)),
+            counts=np.tile(small.log.counts, (times, 1))[:rows],
         )
         problem = small._replace(log=tiled)
         begin = SearchState(

@@ -8,8 +8,9 @@ import sagline as sl
 from sagline.calibration.calibrate import _active_sensors
 from sagline.calibration.least_squares import _predict_state, evaluate_step, solve
 from sagline.calibration.log import load_cells_of
+from sagline.calibration.observations import Readings
 from sagline.calibration.parameters import parameters_of, with_values
-from sagline.calibration.problem import Fit, FitProblem, ReadingsTable, SearchState, start_of
+from sagline.calibration.problem import Fit, FitProblem, SearchState, start_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots, standing
@@ -24,7 +25,7 @@ UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot) -> FitProblem:
     sensors = _active_sensors(made.log)
     parameters = parameters_of(nominal, unknowns, sensors, counted=made.log.counts is not None)
-    return FitProblem(nominal, sl.Catenary(), sensors, parameters, ReadingsTable.of(made.log))
+    return FitProblem(nominal, sl.Catenary(), sensors, parameters, Readings.of(made.log))
 
 
 def fitted(problem: FitProblem, made: Synthetic, *, robust: bool = False) -> Fit:
@@ -151,7 +152,7 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
         model,
         given,
         parameters_of(robot, ALL, given, counted=False),
-        ReadingsTable(None, lengths, cells, *silent),
+        Readings(lengths, cells, *silent),
     )
     before = SearchState(problem.prior, problem.machine_at(problem.prior), lengths, reference.pose_rows(pose))
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))

@@ -14,8 +14,9 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.calibration.least_squares import evaluate_step
+from sagline.calibration.observations import Readings
 from sagline.calibration.parameters import KINDS, OF_FORCES, parameters_of
-from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState
+from sagline.calibration.problem import FitProblem, SearchState
 from sagline.calibration.straight import lines_at
 from sagline.cli.main import app
 from sagline.core.arrays import Array
@@ -100,7 +101,7 @@ def test_slopes_agree_with_differences_of_the_sum_of_squares(name: str, yaw: flo
     ]
     unknowns = [one for one in unknowns if robot.winches is not None or KINDS[one.name].owner != "winches"]
     parameters = parameters_of(robot, unknowns, sensors, counted=False)
-    problem = FitProblem(robot, STRAIGHT, sensors, parameters, ReadingsTable.of(log))
+    problem = FitProblem(robot, STRAIGHT, sensors, parameters, Readings.of(log))
     machine = problem.machine_at(problem.prior)
     rows = pose_rows(pose)
     exact = lines_at(machine, problem.readings(lengths, slice(None)), rows).lengths

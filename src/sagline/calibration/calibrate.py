@@ -15,6 +15,7 @@ from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
 from sagline.calibration.log import READINGS, Sensors, WinchLog
+from sagline.calibration.observations import Readings
 from sagline.calibration.parameters import (
     DEFAULT,
     OF_CELLS,
@@ -26,7 +27,6 @@ from sagline.calibration.parameters import (
 )
 from sagline.calibration.problem import (
     FitProblem,
-    ReadingsTable,
     SearchState,
     held_lengths,
     start_of,
@@ -146,7 +146,7 @@ def calibrate(
     more = fit_log.readings.size - len(fit_log) * len(robot.freedom) if straight else 0
     _check_count(fit_log, parameters, left_out, more, freely=DEFAULT not in wanted)
     moved = None if motion is None or not motion.any() else motion[:, rows]
-    table = ReadingsTable.of(fit_log)._replace(motion=moved)
+    table = Readings.of(fit_log)._replace(motion=moved)
     problem, geometric = FitProblem(robot, model, sensors, parameters, table), None
     if not straight and fit_log.load_cells is None and fit_log.position is not None:
         geometric = _geometric_start(problem, log, rows, asked)
@@ -232,7 +232,7 @@ def _with_assumed_rotations(
     counted_log = log.counts is not None
     asked = checked_unknowns(unknowns, log.sensors, counted=counted_log, straight=True)
     parameters = parameters_of(robot, _with_relative_lengths(log, asked), log.sensors, counted=counted_log)
-    problem = FitProblem(robot, model, log.sensors, parameters, ReadingsTable.of(fit_log))
+    problem = FitProblem(robot, model, log.sensors, parameters, Readings.of(fit_log))
     state = start_of(problem, fit_log.commanded)
     readings = problem.readings(problem.reported_lengths(state.machine), slice(None))
     if "measuring_frame" in parameters.names or rotation_error(state.machine, readings, state.poses) < LEVEL:

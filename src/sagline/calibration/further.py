@@ -6,7 +6,7 @@ docs/model.md, section 14.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -24,13 +24,9 @@ from sagline.statics.slopes import KernelStates
 from sagline.statics.stiffness import natural_frequency
 from sagline.statics.tables import body_table
 
-
-class FurtherRows(NamedTuple):
-    """Residuals and derivatives of E readings at N poses."""
-
-    residual: Array  # readings minus predictions at the given lengths, (N, E); NaN if missing
-    slopes: Array  # derivatives by the P internal parameters, at equilibrium, (N, E, P)
-    by_length: Array  # derivatives by the true lengths, at equilibrium, (N, E, m)
+# Residuals and derivatives of E readings at N poses: readings minus predictions at the given lengths, (N, E), NaN if
+# missing; derivatives by the P internal parameters (N, E, P) and by the true lengths (N, E, m), at equilibrium.
+FurtherRows: TypeAlias = tuple[Array, Array, Array]
 
 
 def swivel_axes(robot: Robot) -> Array:
@@ -110,7 +106,7 @@ def swivel_rows(
     if readings is not None:
         off = readings - _angles_about(reach, zero) - zeros
         residual = np.remainder(off + np.pi, 2.0 * np.pi) - np.pi  # between -pi and pi
-    return FurtherRows(residual, slopes, by_length)
+    return residual, slopes, by_length
 
 
 LENGTH_STEP: Final = 1e-6  # step of the true lengths for difference quotients of frequencies [m]
@@ -177,9 +173,10 @@ def frequency_rows(
     # m, P). steps: of the P parameters. cables: cable_table. Other arguments: as in `swivel_rows`.
     (count, modes), m, width = readings.shape, lengths.shape[1], paid.shape[2]
     rows = np.flatnonzero(~np.isnan(readings).all(axis=1) & np.isfinite(lengths).all(axis=1))
-    found = FurtherRows(np.full((count, modes), np.nan), np.zeros((count, modes, width)), np.zeros((count, modes, m)))
+    residual, by_values = np.full((count, modes), np.nan), np.zeros((count, modes, width))
+    by_length = np.zeros((count, modes, m))
     if not rows.size:
-        return found
+        return residual, by_values, by_length
     sizes = np.concatenate((steps, np.full(m, LENGTH_STEP)))
     longer = np.concatenate((paid, np.broadcast_to(np.eye(m), (count, m, m))), axis=2)[rows] * sizes
     samples = len(rows) * (1 + 2 * len(sizes))
@@ -194,10 +191,10 @@ def frequency_rows(
     _change_data(robot, at, where, scale, steps, len(rows), len(sizes))
     values = _natural_frequencies(terms, robot.freedom, at)[:, :modes].reshape(1 + 2 * len(sizes), len(rows), modes)
     slopes = (values[1 : 1 + len(sizes)] - values[1 + len(sizes) :]) / (2.0 * sizes[:, None, None])
-    found.residual[rows] = readings[rows] - values[0]
-    found.slopes[rows] = slopes[:width].transpose(1, 2, 0)
-    found.by_length[rows] = slopes[width:].transpose(1, 2, 0)
-    return found
+    residual[rows] = readings[rows] - values[0]
+    by_values[rows] = slopes[:width].transpose(1, 2, 0)
+    by_length[rows] = slopes[width:].transpose(1, 2, 0)
+    return residual, by_values, by_length
 
 
 def _second_moments(inertia: Array) -> Array:
@@ -246,17 +243,17 @@ def whitened_further(
     """Whitened slopes (N, E, P), misfit (N, E) and effect on true lengths (N, m, E) of further readings."""
     # deviation: standard deviations (E,). off: reported minus true lengths (N, m) [m]; variance: of reported lengths
     # (m,) [m^2]. before: whitened slopes, misfit and effect on true lengths of the other readings.
-    matrix, misfit, back = before
-    read = ~np.isnan(rows.residual) & ~np.isnan(misfit).any(axis=1, keepdims=True)
-    by_length = np.where(read[..., None], rows.by_length, 0.0)
-    slopes = np.where(read[..., None], rows.slopes, 0.0)
+    (residual, slopes, by_length), (matrix, misfit, back) = rows, before
+    read = ~np.isnan(residual) & ~np.isnan(misfit).any(axis=1, keepdims=True)
+    by_length = np.where(read[..., None], by_length, 0.0)
+    slopes = np.where(read[..., None], slopes, 0.0)
     known = np.where(np.isnan(back), 0.0, back)
     left = np.eye(len(variance)) * variance - known @ np.swapaxes(known, 1, 2)  # covariance of the true lengths
     across = left @ np.swapaxes(by_length, 1, 2)
     covariance = by_length @ across + np.eye(len(deviation)) * np.where(read, deviation**2, 1.0)[:, None]
     whiten = np.linalg.inv(np.linalg.cholesky(covariance))
     best = np.einsum("nij,nj->ni", known, np.where(np.isnan(misfit), 0.0, misfit))
-    missed = np.where(read, rows.residual, 0.0) - np.einsum("nij,nj->ni", by_length, off + best)
+    missed = np.where(read, residual, 0.0) - np.einsum("nij,nj->ni", by_length, off + best)
     reduced = slopes - by_length @ (known @ np.where(np.isnan(matrix), 0.0, matrix))
     missed = np.where(np.isnan(misfit).any(axis=1, keepdims=True), np.nan, np.einsum("nij,nj->ni", whiten, missed))
     return whiten @ reduced, missed, across @ np.swapaxes(whiten, 1, 2)

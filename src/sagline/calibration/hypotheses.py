@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.calibration.least_squares import best_step, evaluate_step, solve
 from sagline.calibration.log import WinchLog
+from sagline.calibration.observations import Readings
 from sagline.calibration.parameters import Unknown, parameters_of
-from sagline.calibration.problem import Evaluated, FitProblem, ReadingsTable, SearchState, start_of
+from sagline.calibration.problem import Evaluated, FitProblem, SearchState, start_of
 from sagline.core.arguments import evenly_spaced
 from sagline.core.arrays import Array, Indices
 from sagline.robot.drum import Drums
@@ -137,7 +138,7 @@ class Trial:
         read_at = self.rows + late + change.behind  # either `late` or `behind` is zero
         rows = self.rows[(read_at >= 0) & (read_at < len(log))]
         rows = rows[evenly_spaced(len(rows), most)]
-        given = ReadingsTable.of(log.rows(rows))._replace(swivels=None, frequencies=None)
+        given = Readings.of(log.rows(rows))._replace(swivels=None, frequencies=None)
         sensors = log.sensors.replace(swivel_deviation=None, frequency_deviation=None)
         read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows + change.behind], change.lengths)
         if log.load_cells is not None:

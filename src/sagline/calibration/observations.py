@@ -9,8 +9,8 @@ import numpy as np
 
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel
-from sagline.calibration.further import FurtherRows, frequency_rows, swivel_rows, whitened_further
-from sagline.calibration.log import Sensors, load_cells_of, measures_yaw, reading_deviations
+from sagline.calibration.further import frequency_rows, swivel_rows, whitened_further
+from sagline.calibration.log import Sensors, WinchLog, load_cells_of, measures_yaw, reading_deviations
 from sagline.calibration.parameters import Parameters, slopes_of_values
 from sagline.core.arrays import Array, blocks, kernel_input, locked
 from sagline.kernels import tables
@@ -60,6 +60,18 @@ class Readings(NamedTuple):
     rotations: Array  # measured rotations, unit quaternions, scalar last, (N, 4)
     swivels: Array | None = None  # swivel angles [rad], (N, m); None for readings that equal the predictions
     frequencies: Array | None = None  # natural frequencies [Hz], (N, K); None without frequencies
+    counts: Array | None = None  # encoder counts, (N, m), from which the lengths follow; None if lengths are read
+    # speed [m/s] and acceleration [m/s^2] of the reported lengths, (2, N, m); None if clock_offset is not estimated
+    motion: Array | None = None
+
+    @classmethod
+    def of(cls, log: WinchLog) -> Readings:
+        """Readings of a log."""
+        count, m = log.readings.shape
+        columns = ((log.unstrained_length, m), (log.load_cells, m), (log.position, 3), (log.rotation, 4))
+        read = (np.broadcast_to(np.nan, (count, width)) if own is None else own for own, width in columns)
+        lengths, cells, positions, rotations = read
+        return cls(lengths, cells, positions, rotations, log.swivel, log.frequency, log.counts)
 
 
 class WhitenedRows(NamedTuple):
@@ -258,15 +270,16 @@ def _with_further(
         at = poses, lengths, places, scale, paid
         steps = _steps(machine) if direction is None else 1.0 / np.abs(direction / _steps(machine)).max(keepdims=True)
         parts.append(frequency_rows(machine.robot, machine.terms, machine.cables, readings.frequencies, *at, steps))
-    rows = FurtherRows(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
+    residual, by_values, by_length = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
     deviation, given = reading_deviations(sensors, m, modes), np.broadcast_to(sensors.length_deviation, m)
     off = readings.lengths - lengths
-    more = whitened_further(rows, deviation[2 * m + 6 :], off, given**2, (found.matrix, found.misfit, found.back))
+    rows, before = (residual, by_values, by_length), (found.matrix, found.misfit, found.back)
+    more = whitened_further(rows, deviation[2 * m + 6 :], off, given**2, before)
     return found._replace(
         matrix=np.concatenate((found.matrix, more[0]), axis=1),
         misfit=np.concatenate((found.misfit, more[1]), axis=1),
         back=np.concatenate((found.back, more[2]), axis=2),
-        residual=np.concatenate((found.residual, rows.residual), axis=1),
+        residual=np.concatenate((found.residual, residual), axis=1),
     )
 
 

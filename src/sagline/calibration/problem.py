@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
 from sagline.calibration.further import circular_mean, swivel_angles
-from sagline.calibration.log import Sensors, WinchLog, load_cells_of, measures_yaw
+from sagline.calibration.log import Sensors, load_cells_of, measures_yaw
 from sagline.calibration.observations import NO_LOAD, MachineTerms, Readings, WhitenedRows, lengths_at_counts
 from sagline.calibration.parameters import Parameters, sensors_with, with_values
 from sagline.calibration.straight import lines_at
@@ -30,30 +30,6 @@ _LINE: Final = 1e-3  # points are collinear if their distance from a line is les
 _NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds with a lower bound of zero, which is also a typical value
 
 
-class ReadingsTable(NamedTuple):
-    """Arrays with the readings at N poses; NaN for a missing reading."""
-
-    counts: Array | None  # encoder counts, (N, m), or None
-    lengths: Array | None  # reported lengths [m], (N, m), or None; exactly one of counts and lengths is given
-    cells: Array  # load cell readings [N], (N, m)
-    positions: Array  # measured positions [m], (N, 3)
-    rotations: Array  # measured rotations as unit quaternions, (N, 4)
-    # speed [m/s] and acceleration [m/s^2] of the reported lengths, (2, N, m); None if clock_offset is not estimated
-    motion: Array | None = None
-    swivels: Array | None = None  # swivel angles [rad], (N, m), or None
-    frequencies: Array | None = None  # natural frequencies [Hz], (N, K), or None
-
-    @classmethod
-    def of(cls, log: WinchLog) -> ReadingsTable:
-        """Readings of a log as a table; columns that the log does not have are NaN."""
-        count, m = log.readings.shape
-        columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
-        tables = (np.broadcast_to(np.nan, (count, width)) if read is None else read for read, width in columns)
-        further = {"swivels": log.swivel, "frequencies": log.frequency}
-        cells, positions, rotations = tables
-        return cls(log.counts, log.unstrained_length, cells, positions, rotations, **further)
-
-
 class FitProblem(NamedTuple):
     """The estimation problem: robot, cable model, sensors, unknown parameters and readings."""
 
@@ -61,7 +37,7 @@ class FitProblem(NamedTuple):
     model: CableModel
     sensors: Sensors
     parameters: Parameters
-    log: ReadingsTable
+    log: Readings
 
     @property
     def prior(self) -> Array:
@@ -120,7 +96,6 @@ class FitProblem(NamedTuple):
             late = machine.late * (speed + 0.5 * machine.late * acceleration)
         if self.log.counts is not None and machine.drums is not None:
             return lengths_at_counts(machine.drums, self.log.counts[part]) + late
-        assert self.log.lengths is not None
         return np.asarray(machine.scale * (self.log.lengths[part] + late) + machine.offset)
 
     def winch_slopes(self, machine: MachineTerms, lengths: Array, part: slice, *, counted: bool = True) -> Array:
