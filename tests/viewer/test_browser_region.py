@@ -86,10 +86,10 @@ def test_a_region_follows_a_slider_and_its_near_side_is_highlighted(
         page.get_by_label("Region", exact=True).click()
         page.get_by_text("Boundary by limiting cable").wait_for()
         await_that(page, lambda: in_full(show))
-        before, mass = show._hull_html.content, viewer.view.snapshot.robot.mass  # type: ignore[union-attr]
+        before, mass = show._result[0], viewer.view.snapshot.robot.mass  # type: ignore[union-attr]
         slide(page, "Platform + load", 8.0)
         await_that(page, lambda: viewer.view is not None and viewer.view.snapshot.robot.mass > mass)
-        await_that(page, lambda: in_full(show) and show._hull_html.content != before)  # nothing was asked for again
+        await_that(page, lambda: in_full(show) and show._result[0] != before)  # nothing was asked for again
         viewer.scene.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
         viewer.refresh()
         await_that(page, lambda: viewer.server.scene.get_handle_by_name("/wall/0") is not None)

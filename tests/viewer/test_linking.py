@@ -105,7 +105,7 @@ def randomly_set(page: Shown, client: Client, random: np.random.Generator) -> No
             steps = int(random.integers(0, round((slider.max - slider.min) / slider.step)))
             client.set(slider, slider.min + steps * slider.step)
     for label in ("Cable model", "Tensions"):
-        options = [each for each in handle(page, label).options if "depends_on_history" not in each]
+        options = [each for each in handle(page, label).options if "depends on history" not in each]
         client.set(handle(page, label), options[int(random.integers(len(options)))])
     client.set(handle(page, "Straight cables beside"), bool(random.random() < 0.5))
     turn = random.uniform(-0.1, 0.1, 4)

@@ -4,6 +4,7 @@ import re
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,21 @@ def heard_for(client: Client, seconds: float) -> list[Any]:
         if time.monotonic() - start > seconds:
             break
     return found
+
+
+@extended
+def test_a_long_list_of_modes_has_forty_rows_and_the_chosen_one() -> None:
+    robot = sl.load_robot("fast")
+    with contextmanager(shown)(lambda server: Page(server, FEATURES, robot, mode="300")) as page:
+        show = page.viewer.feature(ModesFeature)
+        await_that(lambda: show.moving and not show.waiting)
+        rows = rows_of(page)
+        numbers = [int(number) for number in re.findall(r"<button [^>]*>(\d+)</button>", "".join(rows))]
+        assert len(rows) == len(numbers) == 41
+        assert numbers[-1] == 300
+        assert "The list has the lowest 40 modes" in page.text
+        frequencies = [float(row) for row in re.findall(r"<td>([\d.]+)</td>", "".join(rows))]
+        assert frequencies == sorted(frequencies)
 
 
 @extended

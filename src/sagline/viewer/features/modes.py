@@ -101,6 +101,7 @@ def _axes(words: str, across: Place, up: Place, decades: tuple[float, float], fi
 
 UP_TO = 20.0  # initial highest frequency [Hz]
 HIGHEST = 200.0  # largest value of the highest frequency [Hz]
+ROWS: Final = 40  # longest list; each row has a button, and the keyboard reaches what follows only after all buttons
 FIELD = "Mode"
 TOPIC: Final = "mode"  # topic of the messages with the name of a clicked mode
 
@@ -123,13 +124,17 @@ def _swing_text(vibration: Vibration, swing: Swing | None, chosen: str) -> str:
 
 def _list_text(vibration: Vibration, modes: list[ListedMode], chosen: str) -> str:
     head = "<tr><th>mode</th><th>Hz</th><th></th><th>platform</th><th>location</th><th>damping</th></tr>"
-    rows = "".join(_row(mode, chosen) for mode in sorted(modes, key=lambda mode: mode.frequency))
+    ordered = sorted(modes, key=lambda mode: mode.frequency)
+    shown = [mode for k, mode in enumerate(ordered) if k < ROWS or mode.name == chosen]
+    rows = "".join(_row(mode, chosen) for mode in shown)
     table = html_block(f'<div class="modes"><table>{head}{rows}</table></div>')
     if vibration.status is not VibrationStatus.SOLVED:
         return html_block(escape(vibration.status.text)) + table
     count = "complete" if vibration.complete else "not complete"
     ratio = 100.0 * vibration.damping.modal_damping
     text = f"{vibration.frequency.size} modes with cable mass below {vibration.up_to:g} Hz: {count}."
+    if len(shown) < len(modes):
+        text += f" The list has the lowest {ROWS} modes; enter another name in the field above."
     return html_block(f'{text} <span class="quiet">A damping of {ratio:g} % is assumed.</span>') + table
 
 
