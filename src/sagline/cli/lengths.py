@@ -120,7 +120,7 @@ def forward(
     model: str = opt.MODEL,
     wrench: Any = opt.WRENCH,
     payload: float | None = opt.PAYLOAD,
-    files: opt.Files = opt.data_files(table=opt.table(True)),
+    files: opt.Files = opt.data_files(table=opt.csv_flag(True)),
 ) -> int:
     """Find the poses of the platform from measured cable lengths.
 

@@ -152,7 +152,7 @@ def port(default: int) -> int:
     return cast(int, converted(default, "NUMBER", text, whole_of, least=0, most=65535))
 
 
-def table(default: bool, *conditions: Condition) -> bool:
+def csv_flag(default: bool, *conditions: Condition) -> bool:
     """The option `--csv`."""
     return flag(default, "Write the whole table as a CSV file.", "--csv/--no-csv", *conditions)
 
@@ -194,7 +194,7 @@ ROBOT = argument(
 OUTPUT = out(Path("output"))
 STDOUT: Path | None = out(None, "stdout")
 JSON = flag(False, "Print only the numbers on stdout, as JSON.", "--json")
-TABLE = table(False)
+TABLE = csv_flag(False)
 STYLE: str = choice("plain", "STYLE", "Style of the figures", STYLES)
 FORCE = flag(False, "Replace files that exist.", "--force")
 MODEL: str = choice("catenary", "MODEL", "Cable model", MODELS)

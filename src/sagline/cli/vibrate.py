@@ -59,7 +59,7 @@ def vibrate(
     tension: str = opt.TENSION,
     wrench: Any = opt.if_only(opt.WRENCH, WITHOUT_MAP),
     payload: float | None = opt.PAYLOAD,
-    files: opt.Files = opt.Files(table=opt.table(True, WITHOUT_MAP)),
+    files: opt.Files = opt.Files(table=opt.csv_flag(True, WITHOUT_MAP)),
 ) -> int:
     """Find all natural frequencies at a pose: those of the platform, and those of the cables, which vibrate as strings.
 
