@@ -98,20 +98,16 @@ class _ObstacleEntry(YamlEntry):
         return exactly(self.si(key, f"{item}."), f"{item}.{key}", "m", (3,))
 
 
-class _RobotPart(YamlEntry):
-    """Schema of a mapping in a robot file."""
-
-    def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """Set of the keys in the file without `beside`. Raise an error if the set is not one of `ways`."""
-        found = self.model_fields_set.difference(beside)
-        for way in ways:
-            if found == set(way):
-                return way
-        given, allowed = " and ".join(sorted(found)) or "nothing", "; or ".join(" and ".join(way) for way in ways)
-        raise InvalidValueError(item, f"given by {given}", allowed, "Give exactly one of these.")
+def _only_way(item: str, keys: set[str], ways: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
+    """The one of `ways` with the same keys as `keys`. Raise an error if there is none."""
+    for way in ways:
+        if keys == set(way):
+            return way
+    given, allowed = " and ".join(sorted(keys)) or "nothing", "; or ".join(" and ".join(way) for way in ways)
+    raise InvalidValueError(item, f"given by {given}", allowed, "Give exactly one of these.")
 
 
-class _Cables(_RobotPart):
+class _Cables(YamlEntry):
     """Schema of the cables. Each value is one number for all cables, or a list."""
 
     linear_density: Annotated[Any, "kg/m"]
@@ -125,10 +121,10 @@ class _Cables(_RobotPart):
     def cable(self) -> Cable:
         """Create the cables. The stiffness follows from the given keys, and a missing section from the diameter."""
         ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
-        beside = ["linear_density", "expansion"]
-        if self.model_fields_set & {"axial_stiffness", "section_area"}:
-            beside.append("diameter")
-        *_, section = self.only_way("cables: stiffness", ways, beside=tuple(beside))
+        keys = self.model_fields_set - {"linear_density", "expansion"}
+        if keys & {"axial_stiffness", "section_area"}:
+            keys.discard("diameter")
+        *_, section = _only_way("cables: stiffness", keys, ways)
         density = self.si("linear_density", "cables.")
         width = self.si(section, "cables.")
         known = {key: self.si(key, "cables.") for key in ("diameter", "expansion") if key in self.model_fields_set}
@@ -179,7 +175,7 @@ def _vectors(value: object) -> object:
     return SWIVEL_AXES[value]
 
 
-class _Inertia(_RobotPart):
+class _Inertia(YamlEntry):
     """Schema of the inertia about the center of mass: a matrix, its diagonal or elements, or a solid body."""
 
     matrix: Moment = None
@@ -205,8 +201,8 @@ class _Inertia(_RobotPart):
     def about_center(self, mass: float) -> Array:
         """Inertia matrix for a platform of this mass [kg], shape (3, 3)."""
         ways = (("matrix",), ("diagonal",), ("Ixx", "Iyy", "Izz"), ("box",), ("cylinder_radius", "cylinder_height"))
-        mixed = ("Ixy", "Ixz", "Iyz") if "Ixx" in self.model_fields_set else ()
-        way = self.only_way("inertia", ways, beside=mixed)
+        keys = self.model_fields_set
+        way = _only_way("inertia", keys - {"Ixy", "Ixz", "Iyz"} if "Ixx" in keys else keys, ways)
         values = [self.si(key, "inertia.") for key in way]
         match way[0]:
             case "matrix":
