@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -104,12 +104,6 @@ class SharedMotion:
             session.length, which.astype(np.intp), verdicts,
         )  # fmt: skip
 
-    def pose_at(self, index: int) -> Pose | None:
-        """Pose of the platform at a sample; None if it is not known."""
-        if not np.isfinite(self.position[index]).all():
-            return None
-        return Pose.from_quaternion(self.position[index], self.quaternion[index])
-
     def thinned(self) -> SharedMotion:
         """Every n-th sample and the last sample, if the rate exceeds that of screens. A note has the number n."""
         count, duration = len(self.time), float(self.time[-1])
@@ -120,9 +114,7 @@ class SharedMotion:
         note = f"One in {every} of {count:,} samples is kept."
         fields = ("time", "position", "quaternion", "tension", "chord_tension", "length", "verdict")
         kept = {name: getattr(self, name)[rows] for name in fields}
-        return SharedMotion(
-            self.robot, self.kind, quantity=self.quantity, verdicts=self.verdicts, notes=(*self.notes, note), **kept
-        )
+        return replace(self, notes=(*self.notes, note), **kept)
 
 
 def _why(gap: Gap) -> str:

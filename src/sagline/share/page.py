@@ -14,6 +14,7 @@ import numpy as np
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
+from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.course import SharedMotion
@@ -62,7 +63,9 @@ def robot_page(robot: Robot) -> str:
 def course_page(course: SharedMotion, title: str) -> str:
     """Page for the playback of a run."""
     robot, kept = course.robot, course.thinned()
-    first = kept.pose_at(0)
+    start = home_pose(robot)
+    if np.isfinite(kept.position[0]).all():
+        start = Pose.from_quaternion(kept.position[0], kept.quaternion[0])
     header, text = encode_columns(
         [
             PackedColumn("time", kept.time, TIME),
@@ -90,7 +93,7 @@ def course_page(course: SharedMotion, title: str) -> str:
         controls=_clock(),
         over=HOME,
         quantity=kept.quantity,
-        still=robot_drawing(robot, home_pose(robot) if first is None else first, kept.chord_tension[0]),
+        still=robot_drawing(robot, start, kept.chord_tension[0]),
         table=_table(robot, kept.tension[0], kept.length[0]),
         notes=(*kept.notes, _precision()),
         facts=facts,
