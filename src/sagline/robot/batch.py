@@ -104,7 +104,7 @@ def refuse_slanted(robot: Robots, *, only_platform: bool = False) -> None:
             shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
             step = (
                 "Other axes: use inverse, forward, confirm, stiffness, modes, calibrate or simulate (massless cables), "
-                "without friction; or margin or workspace (massless cables, or fewer cables than freedoms)."
+                "margin or workspace, without friction."
             )
             raise InvalidValueError(f"winches: swivel_axis[{cable}]", f"({shown})", "up or down here", step)
 

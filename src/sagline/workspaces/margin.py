@@ -24,12 +24,16 @@ from sagline.robot.batch import Robots, first_of, has_slanted_axes, one_a_pose, 
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_cable_count, check_reach
 from sagline.robot.robot import Robot
-from sagline.statics.tables import geometry_of, pose_rows, robot_terms, tangent_eyelets
+from sagline.statics.tables import check_slanted, geometry_of, pose_rows, robot_terms, tangent_eyelets
 from sagline.tension.method import LIMITS_OF
+from sagline.workspaces.moving_exits import move_exits
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet, load_of
 
 if TYPE_CHECKING:
+    from sagline.kernels.inverse.poses import LimitTerms, ModelTerms
     from sagline.kernels.inverse.poses import Robots as RobotTerms
+
+    _Given = tuple[ModelTerms, LimitTerms, RobotTerms, SetTerms, tuple[Array, Array]]
 
 BLOCK = 1 << 13  # poses per block; a block takes about 0.1 s, and interrupts are handled between blocks
 _CATENARY = Catenary()
@@ -53,7 +57,7 @@ class MarginRows:
     per pose. Several threads may call `rows` at the same time.
     """
 
-    __slots__ = ("_given", "cable_count", "robot_count")
+    __slots__ = ("_given", "_robots", "cable_count", "robot_count")
 
     def __init__(
         self,
@@ -67,8 +71,12 @@ class MarginRows:
         # If `cables` (R, m, CABLE_COLUMNS) is given, the R robots are copies of `robot` with these tables of cables.
         robots = together(robot)
         shared = first_of(robots)
-        if not model.weightless:
-            refuse_slanted(robots)
+        moving = not model.weightless and has_slanted_axes(robots)
+        if moving:
+            refuse_slanted(robots, only_platform=True)
+            check_slanted(robots, model)
+        # robots with exit points that move with the tensions
+        self._robots = (robots, model) if moving else None
         freedom, bodies, table = robot_terms(robots, slanted=cables is None)
         if cables is not None:
             table = _locked(cables)
@@ -88,7 +96,7 @@ class MarginRows:
         """`MarginRows` for the wrench set shifted by `wrench` [N, N m], (6,), which is not checked."""
         model, limits, terms, loads, arms = self._given
         moved = object.__new__(MarginRows)
-        moved.cable_count, moved.robot_count = self.cable_count, self.robot_count
+        moved.cable_count, moved.robot_count, moved._robots = self.cable_count, self.robot_count, self._robots
         moved._given = (model, limits, terms, (_locked(loads[0] + wrench), *loads[1:]), arms)
         return moved
 
@@ -99,38 +107,61 @@ class MarginRows:
         if count % self.robot_count:
             step = f"Give every one of the {self.robot_count} robots the same number of poses."
             raise InvalidValueError("poses", f"{count} of them", f"a multiple of {self.robot_count}", step)
-        numbers, counters = memory_for(self.cable_count)
-        memory = (
-            np.empty(2 * numbers.size + margin_memory(len(self._given[2][0]), self.cable_count)),
-            np.empty(2 * counters.size, dtype=np.int64),
-            np.empty(self.cable_count, dtype=np.int8),
-        )
-        margins = (
-            np.empty((3, count)),
-            np.empty((count, 6)),
-            np.empty(count, dtype=np.int64),
-            np.empty(count, dtype=np.int8),
-        )
-        model, limits, terms, loads, arms = self._given
-        given = (model, limits, _at_tangents(terms, rows), loads, arms, locked(rows), memory, margins)
-        if count <= BLOCK and progress is None:
-            signed_margins(*given, 0, count)
-        else:
-            for part in blocks(count, BLOCK, progress):
-                signed_margins(*given, part.start, part.stop)
-        values, directions, limiting, statuses = margins
-        return Bracket(values[0], values[1], values[2], limiting, statuses, directions)
+        if self._given[2][2].shape[2] == tables.CABLE_COLUMNS:
+            return _measured(self._given, rows, progress)
+        model, limits, (freedom, *terms), loads, both = self._given
+        bodies, table, inertias, arm, lever = (_each(array, count) for array in (*terms, loads[-1], *both))
+        geometry = geometry_of(table, bodies, rows)
+        # cables from eyelets at the exit points of straight cables
+        eyelets = locked(tangent_eyelets(table, Pose._adopt(rows[:, :3], rows[:, 3:]), geometry))
+        loads = *loads[:-1], inertias
+        found = _measured((model, limits, (freedom, bodies, eyelets), loads, (arm, lever)), rows, progress)
+        if self._robots is not None:
+
+            def at_exits(which: Indices, exits: Array) -> Array:
+                """Margins of the poses `which` with other exit points."""
+                own = eyelets[which]
+                own[..., : tables.PLATFORM_X] = exits
+                some, arms = (freedom, _at(bodies, which), locked(own)), (_at(arm, which), _at(lever, which))
+                return _measured((model, limits, some, (*loads[:-1], _at(inertias, which)), arms), rows[which]).value
+
+            move_exits(*self._robots, rows, (limits[0], bodies, table, geometry, arm), loads, at_exits, found)
+        return found
 
 
-def _at_tangents(terms: RobotTerms, rows: Array) -> RobotTerms:
-    """Robot arrays with the exit points of straight cables at the poses `rows`, if the swivel axes are slanted."""
-    freedom, bodies, table = terms
-    if table.shape[2] == tables.CABLE_COLUMNS:
-        return terms
-    # these cables are cables from eyelets at their exit points
-    table = locked(np.repeat(table, len(rows) // len(table), axis=0)) if len(table) > 1 else table
-    pose = Pose._adopt(rows[:, :3], rows[:, 3:])
-    return freedom, bodies, locked(tangent_eyelets(table, pose, geometry_of(table, bodies[:1], rows)))
+def _measured(given: _Given, rows: Array, progress: Progress | None = None) -> Bracket:
+    """Margins at the poses `rows` (N, 7) from the arguments of the kernel."""
+    count, (freedom, _bodies, table) = len(rows), given[2]
+    numbers, counters = memory_for(table.shape[1])
+    memory = (
+        np.empty(2 * numbers.size + margin_memory(len(freedom), table.shape[1])),
+        np.empty(2 * counters.size, dtype=np.int64),
+        np.empty(table.shape[1], dtype=np.int8),
+    )
+    margins = (
+        np.empty((3, count)),
+        np.empty((count, 6)),
+        np.empty(count, dtype=np.int64),
+        np.empty(count, dtype=np.int8),
+    )
+    arguments = (*given, locked(rows), memory, margins)
+    if count <= BLOCK and progress is None:
+        signed_margins(*arguments, 0, count)
+    else:
+        for part in blocks(count, BLOCK, progress):
+            signed_margins(*arguments, part.start, part.stop)
+    values, directions, limiting, statuses = margins
+    return Bracket(values[0], values[1], values[2], limiting, statuses, directions)
+
+
+def _each(array: Array, count: int) -> Array:
+    """Rows of `count` poses from the rows of one or R robots; one row remains one row."""
+    return array if len(array) == 1 else locked(np.repeat(array, count // len(array), axis=0))
+
+
+def _at(array: Array, which: Indices) -> Array:
+    """Rows `which` of an array with one row per pose; one row remains one row."""
+    return array if len(array) == 1 else locked(array[which])
 
 
 def mean_arms(table: Array, bodies: Array) -> Array:
@@ -294,7 +325,7 @@ def margin(
     Raises:
         InvalidValueError: If an argument is of the wrong kind. If the robot has fewer cables than degrees of freedom.
             If its motion pattern does not allow the motion from the first pose to another pose. If a cable with mass
-            has a winch on the platform or a pulley with a swivel axis that is not vertical.
+            has a winch on the platform.
 
     Examples:
         >>> import sagline as sl

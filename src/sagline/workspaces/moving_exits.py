@@ -1,0 +1,139 @@
+"""Margins of cables with mass whose exit points move with the tensions; docs/model.md, section 13.2.
+
+The margin is computed with the exit points of straight cables. This module bounds the error. Where the bounds do not
+decide the sign of the margin, `inverse` decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Indices, locked
+from sagline.kernels import codes, tables
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.workspaces.wrench_set import SetTerms
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.batch import Robots
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from sagline.workspaces.margin import Bracket
+
+# for limits of chord tensions and of frame-end tensions: largest wD/(2 tau) with a bound; factor of the bound, which
+# includes the motion of the limit; largest difference between both tensions, relative to wD/2
+SLACKEST: Final = {codes.LIMITS_OF_CHORD: (1.0, 1.0, 0.0), codes.LIMITS_OF_FRAME_END: (0.5, 3.3, 0.61)}
+STRETCH: Final = 0.02  # largest wD/(2 EA) with a bound
+STEEPEST: Final = (
+    1.14  # largest slope of a sag force with respect to the exit point up to wD/(2 tau) = 1, in units of w
+)
+BEND: Final = 1.1  # bound of asin(y)/y up to y = 0.7
+TURN: Final = 0.02  # [rad], added to the largest turn of the force
+HARDLY: Final = 1e-9  # [N], smallest distance of the margin of an infeasible pose from zero
+
+
+def errors_of_exits(table: Array, gravity: float, geometry: Array, limited: int) -> Array:
+    """Bounds (N, m) [N] of the errors of the cables' forces with exit points of straight cables; infinite if unknown.
+
+    `table` (1 or N, m, SWIVEL_COLUMNS) and `geometry` (N, GEOMETRY_ROWS, m) are those of pulleys at the frame.
+    """
+    radius, low, weight = table[..., tables.PULLEY_RADIUS], table[..., tables.TENSION_MIN], table[..., tables.DENSITY]
+    weight, chord, cosine = weight * gravity, geometry[:, g.CHORD], geometry[:, g.COSINE]
+    tangent = cosine * geometry[:, g.AZIMUTH_X], cosine * geometry[:, g.AZIMUTH_Y], geometry[:, g.SINE]
+    axis = np.moveaxis(table[..., tables.AXIS_X : tables.SWIVEL_COLUMNS], -1, 0)
+    with np.errstate(all="ignore"):
+        half, (slackest, factor, apart) = 0.5 * weight * (chord + 4.0 * radius), SLACKEST[limited]
+        low = low - apart * half
+        x = half / low
+        sag_force = half * (np.sinh(x) / x + x / 3.0)  # at the frame end
+        turn = np.arcsin(sag_force / low)  # largest angle between force and chord
+        wrap = np.arccos(np.clip(sum(a * b for a, b in zip(axis, tangent, strict=True)), -1.0, 1.0))
+        wrap = wrap + 2.0 * turn + TURN  # largest wrap angle
+        weighs = weight * radius * (wrap - np.sin(wrap)) / ((low - sag_force) * (1.0 - np.cos(wrap)) * np.sin(wrap))
+        swings = weighs / (1.0 - weighs)  # tangent of the turn due to the weight on the pulley
+        steepness = np.maximum(1.0, np.tan(0.5 * wrap))
+        feedback = BEND * radius * steepness / chord
+        moved = radius * (steepness * turn + (1.0 - np.cos(wrap)) * swings + swings**2) / (1.0 - feedback)
+        known = (
+            (low > 0.0)
+            & (x <= slackest)
+            & (half <= STRETCH * table[..., tables.STIFFNESS])
+            & (wrap < np.pi)
+            & (weighs < 0.3)
+            & (feedback < 0.5)
+            & (moved < 0.5 * chord)
+        )
+        known &= BEND * moved / chord <= turn + TURN
+        error = factor * (BEND * low / chord + STEEPEST * weight) * moved
+    return np.where(radius * weight == 0.0, 0.0, np.where(known, error, np.inf))
+
+
+Measure = Callable[[Indices, Array], Array]
+Terms = tuple[int, Array, Array, Array, Array]
+
+
+def move_exits(
+    robots: Robots, model: CableModel, rows: Array, terms: Terms, loads: SetTerms, at_exits: Measure, found: Bracket
+) -> None:
+    """Correct the margins `found` at the poses `rows`, which have exit points of straight cables, for their motion."""
+    # terms: tension that the limits apply to; `body_table`, `cable_table`, geometry and lever arm of every pose. Body,
+    # table and lever arm have one row if they are the same at all poses. at_exits: margins with other exit points.
+    limited, bodies, table, geometry, arm = terms
+    count = len(rows)
+    levers = np.linalg.norm(geometry[:, g.LEVER_X : g.LEVER_Z + 1], axis=1)
+    force = errors_of_exits(table, float(bodies[0, tables.GRAVITY]), geometry, limited)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.where(force > 0.0, force * np.hypot(1.0, levers / arm[:, None]), 0.0).sum(axis=1)
+    known = np.isfinite(found.value)
+    found.low[known] -= error[known]
+    found.high[known] += error[known]
+    verdict = np.where(found.high < 0.0, codes.MARGIN_INFEASIBLE, codes.MARGIN_OPEN)
+    found.status[known] = np.where(found.low >= 0.0, codes.MARGIN_FEASIBLE, verdict)[known]
+    left = np.flatnonzero(known & (found.status == codes.MARGIN_OPEN))
+    if not left.size:
+        return
+    some = robots if isinstance(robots, Robot) else tuple(robots[k * len(robots) // count] for k in left)
+    pose, mass = Pose._adopt(locked(rows[left, :3]), locked(rows[left, 3:])), bodies[left % len(bodies), tables.MASS]
+    wrench = _worst_wrenches(loads, found.direction[left], pose.matrix, mass, left % len(loads[-1]))
+    plan = inverse(some, pose, model, wrench=locked(wrench), stability=False)
+    solved, exits = plan.status == PoseStatus.SOLVED, plan.exit_point
+    yes, no = left[solved], left[plan.status == PoseStatus.INFEASIBLE]
+    if exits is not None:
+        found.value[yes] = np.clip(at_exits(yes, exits[solved]), 0.0, found.high[yes])
+    # continuous at the boundary of feasibility, where the exit points of the found tensions and the shortfall are exact
+    short = np.maximum(plan.shortfall[plan.status == PoseStatus.INFEASIBLE], HARDLY)
+    short[np.isnan(short)] = np.inf
+    beyond = np.where(short < np.inf, found.low[no], -HARDLY)
+    found.value[no] = np.maximum(-short, np.where(found.value[no] < 0.0, found.value[no], beyond))
+    found.high[no] = np.minimum(found.high[no], found.value[no])
+    found.status[no] = codes.MARGIN_INFEASIBLE
+    if _is_single(loads):
+        found.low[yes] = np.maximum(found.low[yes], 0.0)
+        found.status[yes] = codes.MARGIN_FEASIBLE
+
+
+def _worst_wrenches(loads: SetTerms, direction: Array, matrix: Array, mass: Array, robot: Indices) -> Array:
+    """Wrenches (K, 6) of a set with the smallest components along `direction` (K, 6). `robot`: rows of inertias."""
+    center, half, segments, ellipsoids, corners, sizes, (linear, angular), inertias = loads
+    found = center - np.sign(direction) * half - np.sign(direction @ segments.T) @ segments
+    found[:, :3] -= linear * mass[:, None] * np.sign(direction[:, :3])
+    spins = angular * matrix @ inertias[robot] @ np.swapaxes(matrix, 1, 2)
+    along = np.sign((spins @ direction[:, 3:, None])[..., 0])
+    found[:, 3:] -= np.einsum("kj,kjl->kl", along, spins)
+    for axes in ellipsoids:
+        along = direction @ axes.T
+        found -= along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300) @ axes
+    for own in np.split(corners, np.cumsum(sizes)[:-1]) if len(sizes) else ():
+        found += own[np.argmin(direction @ own.T, axis=1)]
+    return found
+
+
+def _is_single(loads: SetTerms) -> bool:
+    """True if the set has only one wrench."""
+    _center, half, segments, ellipsoids, _corners, sizes, accelerations, _inertias = loads
+    return not (half.any() or len(segments) or len(ellipsoids) or (sizes > 1).any() or accelerations.any())
