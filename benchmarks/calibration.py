@@ -50,7 +50,7 @@ def plain_seconds(log: sl.WinchLog) -> float:
     def misses(x: Array) -> Array:
         numbers, lengths = x[:width], x[width:].reshape(state.lengths.shape)
         robot = with_values(COGIRO, problem.parameters, problem.parameters.external(numbers))
-        drums = Drums.of(robot)
+        drums = Drums(robot)
         said = drums.lengths_at(log.readings) / (1.0 + drums.rest_strain)
         found = sl.forward(robot, lengths, log.commanded)
         cells = (read - found.state.cables.frame_end_tension) / deviation

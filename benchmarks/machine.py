@@ -24,7 +24,7 @@ ROBOTS = ("article-suspended", "article-mixed", "cogiro", "ipanema-1")
 def counts() -> Iterator[Row]:
     """Conversion of counts to lengths and back, over four layers with a moving exit point."""
     robot = wound()
-    drums = Drums.of(robot)
+    drums = Drums(robot)
     turns = np.random.default_rng(6).uniform(0.0, drums.most[0], (COUNTS // 8, 8))
     given = np.rint(drums.counts(drums.lengths(turns)))
     length = sl.lengths_from_counts(robot, given)

@@ -108,7 +108,7 @@ class Machine:
 
 def counts_of(robot: sl.Robot, lengths: Array) -> Array:
     """Counts at unstrained lengths (N, m), not rounded, unlike `encoder_counts`."""
-    drums = Drums.of(robot)
+    drums = Drums(robot)
     return drums.counts(lengths * (1.0 + drums.rest_strain))
 
 

@@ -27,7 +27,7 @@ def plan(robot: sl.Robot) -> sl.Plan:
 
 
 def test_a_million_counts_are_recovered_over_four_layers(robot: sl.Robot) -> None:
-    drums = Drums.of(robot)
+    drums = Drums(robot)
     assert drums.most[0] == pytest.approx(80.0)
     rng = np.random.default_rng(5)
     turns = rng.uniform(0.0, 80.0, (125_000, 8))

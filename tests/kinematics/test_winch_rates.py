@@ -32,7 +32,7 @@ def differences(plan: sl.Plan, values: np.ndarray) -> np.ndarray:
 
 
 def test_speeds_are_differences_of_counts(plan: sl.Plan, rates: sl.WinchRates) -> None:
-    drums = Drums.of(plan.state.one_robot)
+    drums = Drums(plan.state.one_robot)
     counts = drums.counts(plan.unstrained_length * (1.0 + drums.rest_strain))
     assert rates.count_rate is not None
     scale = np.abs(rates.count_rate).max()
@@ -62,7 +62,7 @@ def test_power_is_that_of_cable_friction_and_inertia(plan: sl.Plan, rates: sl.Wi
 
 def test_the_torque_has_the_radius_of_the_layer(plan: sl.Plan, rates: sl.WinchRates) -> None:
     assert rates.motor_torque is not None
-    drums = Drums.of(plan.state.one_robot)
+    drums = Drums(plan.state.one_robot)
     turns, _ = drums.turns(plan.unstrained_length * (1.0 + drums.rest_strain))
     radius = 0.05 + np.floor(turns / 20.0) * 0.004 * np.sqrt(3.0) / 2.0
     assert np.unique(radius).size > 1
@@ -111,7 +111,7 @@ def test_poses_without_times_have_no_rates(plan: sl.Plan) -> None:
 def test_the_lever_arm_differs_from_the_radius_as_documented() -> None:
     """A drum with one layer whose exit point moves from 40 mm on one side of the pulley to 40 mm on the other."""
     robot = wound(drum_width=0.08, layers=1, cable_length=12.0, length_zero=10.0)
-    drums = Drums.of(robot)
+    drums = Drums(robot)
     turns = np.linspace(0.0, 20.0, 201)[:, None] * np.ones(8)
     _, travel = drums.turns(drums.lengths(turns))
     off = travel / (2.0 * np.pi * 0.05) - 1.0

@@ -66,7 +66,7 @@ def test_a_cable_of_negative_length_has_no_tension() -> None:
 
 
 def test_beginnings_of_layers() -> None:
-    drums = Drums.of(wound())
+    drums = Drums(wound())
     assert drums.starts.shape == (8, 5)
     np.testing.assert_allclose(drums.lengths(np.full((1, 8), 40.0))[0], drums.starts[:, 2], rtol=1e-15)
     np.testing.assert_allclose(drums.turns(drums.starts[:, 1:2].T)[0][0], 20.0, rtol=1e-14)
@@ -77,8 +77,8 @@ def test_beginnings_of_layers() -> None:
 def test_drums_of_different_cables() -> None:
     layers = np.array([4, 4, 5, 4, 6, 4, 4, 4])
     robot = wound(layers=layers, drum_radius=np.linspace(0.048, 0.08, 8))
-    drums = Drums.of(robot)
-    alone = Drums.of(wound(layers=6, drum_radius=np.linspace(0.048, 0.08, 8)[4]))
+    drums = Drums(robot)
+    alone = Drums(wound(layers=6, drum_radius=np.linspace(0.048, 0.08, 8)[4]))
     turns = np.linspace(0.0, 119.0, 40)[:, None] * np.ones(8)
     np.testing.assert_array_equal(drums.lengths(turns)[:, 4], alone.lengths(turns)[:, 4])
     np.testing.assert_array_equal(drums.most, 20.0 * layers)
@@ -86,7 +86,7 @@ def test_drums_of_different_cables() -> None:
 
 @pytest.mark.parametrize("offset", [-0.11, 0.0, 0.05])
 def test_lengths_are_continuous_at_the_end_of_a_layer(offset: float) -> None:
-    drums = Drums.of(wound(drum_offset=offset))
+    drums = Drums(wound(drum_offset=offset))
     ends = 20.0 * np.arange(1, 4)[:, None] * np.ones(8)
     before, after = drums.lengths(ends - 1e-9), drums.lengths(ends + 1e-9)
     np.testing.assert_allclose(before, after, rtol=0.0, atol=1e-8)

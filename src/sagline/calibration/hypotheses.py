@@ -188,7 +188,7 @@ class Trial:
 
     def _counts_of_length(self) -> Array:
         """Encoder counts (m,) per meter of cable that leaves the lowest layer of each drum [1/m]."""
-        drums = Drums.of(self.robot)
+        drums = Drums(self.robot)
         rate = drums.zero_and_rate()[1]
         _, travel = drums.turns(drums.starts[:, :1].T)
         return np.asarray(rate / np.abs(travel[0]))

@@ -308,7 +308,7 @@ def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
     if not counted:
         shift[kinds.ZERO] = share[kinds.SCALE] = 1.0
         return shift, share
-    drums = Drums.of(robot)
+    drums = Drums(robot)
     stretch, zero = 1.0 + drums.rest_strain, drums.winches.length_zero
     radius, diameter, pitch = drums.winches.drum_radius, robot.cables.diameter, drums.winches.groove_pitch
     if zero is None or radius is None or diameter is None or pitch is None:  # counts give no lengths without these data

@@ -47,7 +47,7 @@ def counts_at(drums: Drums, lengths: Array) -> Array:
 
 
 def _known_field(of: Winch | Cable, name: str) -> Array:
-    """Value of a field of the winches; `Drums.of` has checked that the field is not None."""
+    """Value of a field of the winches; `Drums` has checked that the field is not None."""
     return np.asarray(getattr(of, name))
 
 
@@ -159,7 +159,7 @@ class MachineTerms(NamedTuple):
             np.broadcast_to(scale, robot.cable_count),
             np.broadcast_to(late, robot.cable_count),
             np.broadcast_to(swivel_zero, robot.cable_count),
-            Drums.of(robot) if parameters.counted else None,
+            Drums(robot) if parameters.counted else None,
             (model.code, *model.parameters, has_routing(robot) or None),
             body_table(robot),
             cable_table(robot, slanted=True),
@@ -218,7 +218,7 @@ class MachineTerms(NamedTuple):
             value = _known_field(winches, name)
             step = STEP * value
             ends = (robot.replace(winches=winches.replace(**{name: value + sign * step})) for sign in (-1.0, 1.0))
-            low, high = (lengths_at_counts(Drums.of(end), counts) for end in ends)
+            low, high = (lengths_at_counts(Drums(end), counts) for end in ends)
             slopes[row] = (high - low) / (2.0 * step)
         return slopes
 

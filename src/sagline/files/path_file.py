@@ -171,7 +171,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
         "unstrained_length": plan.unstrained_length,
     }
     if has_drum_data(plan.robot):
-        rows["counts"] = counts_at(Drums.of(plan.robot), plan.unstrained_length)
+        rows["counts"] = counts_at(Drums(plan.robot), plan.unstrained_length)
     poses = [
         {name: _round(row, _DECIMALS[name]) for name, row in zip(rows, each, strict=True)}
         for each in zip(*rows.values(), strict=True)

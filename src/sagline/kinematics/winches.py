@@ -69,7 +69,7 @@ def encoder_counts(
     robot = instance(plan, Plan, "plan").robot
     choice(winding, "winding", get_args(Winding))
     optional(creep, Creep, "creep")
-    drums = Drums.of(robot)
+    drums = Drums(robot)
     longer = warmth(robot, temperature)
     if creep is not None:
         if plan.path is None:
@@ -120,7 +120,7 @@ def lengths_from_counts(
     Source:
         docs/model.md, section 10.
     """
-    drums = Drums.of(instance(robot, Robot, "robot"))
+    drums = Drums(instance(robot, Robot, "robot"))
     choice(winding, "winding", get_args(Winding))
     rows = _rows(robot, counts, "counts", "")
     path = drums.lengths_at(np.atleast_2d(rows))
@@ -289,7 +289,7 @@ def _levers(robot: Robot, length: Array) -> tuple[Winch, Array, Array]:
     bare = cables.diameter is None and winches is not None and winches.groove_pitch is None
     if bare and winches is not None and winches.drum_radius is not None:
         return winches, 1.0 + winches.winding_tension / cables.axial_stiffness, winches.drum_radius
-    drums = Drums.of(robot)
+    drums = Drums(robot)
     stretch = 1.0 + drums.rest_strain
     _, travel = drums.turns(length * stretch)
     return drums.winches, stretch, travel / (2.0 * np.pi)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import factorial
+from math import comb, factorial
 from typing import Final
 
 import numpy as np
@@ -16,7 +15,6 @@ from sagline.motion.path import Path
 from sagline.robot.pose import Pose, PoseLike, pose_of
 
 
-@dataclass(frozen=True, slots=True)
 class RestProfile:
     """Polynomial that increases from 0 at s = 0 to 1 at s = 1, with k derivatives that are zero at both ends.
 
@@ -24,24 +22,15 @@ class RestProfile:
 
     Attributes:
         order: Number k, >= 2: 2 for the quintic (no acceleration at the ends), 3 for the septic (also no jerk).
+        slope: Constant c = (2 k + 1)!/(k!)^2, which makes the integral of c u^k equal to one.
         tail: Coefficients of the polynomial divided by s^(k + 1), in ascending powers of s.
     """
 
-    order: int
-    tail: tuple[float, ...]
-
-    @classmethod
-    def of_order(cls, order: int) -> RestProfile:
+    def __init__(self, order: int) -> None:
         """Create the profile with the first `order` derivatives equal to zero at both ends."""
-        k = order
-        scale = factorial(2 * k + 1) // factorial(k) ** 2
-        binomials = (factorial(k) // factorial(i) // factorial(k - i) for i in range(k + 1))
-        return cls(k, tuple(scale * (-1) ** i * b / (k + 1 + i) for i, b in enumerate(binomials)))
-
-    @property
-    def slope(self) -> float:
-        """Constant c = (2 k + 1)!/(k!)^2, which makes the integral of c u^k equal to one."""
-        return float(factorial(2 * self.order + 1) // factorial(self.order) ** 2)
+        scale = factorial(2 * order + 1) // factorial(order) ** 2
+        self.order, self.slope = order, float(scale)
+        self.tail = tuple(scale * (-1) ** i * comb(order, i) / (order + 1 + i) for i in range(order + 1))
 
     @property
     def peak_speed(self) -> float:
@@ -71,14 +60,13 @@ class RestProfile:
         return self.slope * u**k, second, third
 
 
-QUINTIC: Final = RestProfile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
-SEPTIC: Final = RestProfile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
+QUINTIC: Final = RestProfile(2)  # 10 s^3 - 15 s^4 + 6 s^5
+SEPTIC: Final = RestProfile(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
 STILL = 1e-9  # [m] and [rad]; a smaller motion is a rounding error of a waypoint
 BLOCK = 1 << 16  # number of samples per block; temporary arrays then take a few MB
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Segments:
     """S straight segments, each with a rotation about a fixed axis.
 
@@ -92,29 +80,22 @@ class Segments:
             rotation by the angle a is cos(a/2) q + sin(a/2) p.
     """
 
-    profile: RestProfile
-    start: Array
-    move: Array
-    turn: Array
-    start_quaternion: Array
-    side_quaternion: Array
-
-    @classmethod
-    def between(cls, stops: Pose, profile: RestProfile) -> Segments:
+    def __init__(self, stops: Pose, profile: RestProfile) -> None:
         """Create the segments between consecutive poses of a batch."""
-        move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
-        if np.array_equal(kept, stops.quaternion[1:]):  # no rotation, so no axis is needed
-            return cls(profile, stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
+        self.profile, self.start, self.move = profile, stops.position[:-1], np.diff(stops.position, axis=0)
+        self.start_quaternion = stops.quaternion[:-1]
+        self.turn, self.side_quaternion = np.zeros_like(self.move), np.zeros_like(self.start_quaternion)
+        if np.array_equal(self.start_quaternion, stops.quaternion[1:]):  # no rotation, so no axis is needed
+            return
         from scipy.spatial.transform import Rotation  # the import would take a third of the load time of sagline
 
         first, second = stops.rotation[:-1], stops.rotation[1:]
-        turn = (second * first.inv()).as_rotvec()
-        angle = np.linalg.norm(turn, axis=1, keepdims=True)
-        axis = np.where(angle > 0.0, turn / np.where(angle > 0.0, angle, 1.0), (0.0, 0.0, 1.0))
+        self.turn = (second * first.inv()).as_rotvec()
+        angle = np.linalg.norm(self.turn, axis=1, keepdims=True)
+        axis = np.where(angle > 0.0, self.turn / np.where(angle > 0.0, angle, 1.0), (0.0, 0.0, 1.0))
         # a quaternion without scalar part is a rotation by 180 degrees
         half_turn = Rotation.from_quat(np.hstack((axis, np.zeros_like(angle))))
-        side = (half_turn * first).as_quat()
-        return cls(profile, stops.position[:-1], move, turn, first.as_quat(), side)
+        self.start_quaternion, self.side_quaternion = first.as_quat(), (half_turn * first).as_quat()
 
     def __len__(self) -> int:
         """Number of segments S."""
@@ -304,7 +285,7 @@ def _rest_to_rest(
     rate: float,
 ) -> Path:
     """Path of segments with the profile `profile`, and with durations or with limits in the order of `LIMITS`."""
-    segments = Segments.between(_as_pose(waypoints), profile)
+    segments = Segments(_as_pose(waypoints), profile)
     given = [name for name, value in zip(LIMITS, limits, strict=True) if value is not None]
     if (durations is None) == (not given):
         value = f"given by durations and {given[0]}" if given else "missing"

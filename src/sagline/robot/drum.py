@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Final
 
@@ -27,7 +26,6 @@ _ZERO_STEP: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Drums:
     """Drums of m cables. All lengths are lengths off the drums at the winding tension.
 
@@ -40,15 +38,7 @@ class Drums:
         most: Largest number of turns on the drum, shape (m,); inf if not known.
     """
 
-    winches: Winch
-    table: Array
-    starts: Array
-    rest_strain: Array
-    fewest: Array
-    most: Array
-
-    @classmethod
-    def of(cls, robot: Robot) -> Drums:
+    def __init__(self, robot: Robot) -> None:
         """Drums of a robot. The winches must have drum_radius and groove_pitch, and the cables a diameter."""
         # Drums with several layers also need drum_width and cable_length. A drum_distance also requires cable_length.
         winches, diameter = robot.winches, robot.cables.diameter
@@ -63,7 +53,9 @@ class Drums:
         if winches is None or diameter is None or missing:
             step = "Give them in the robot file, or with robot.replace(winches=Winch(...), cables=Cable(...))."
             raise InvalidValueError(*not_given(missing), "a known value for each drum", step)
-        return cls(winches, *_tables(winches, diameter), *_limits(winches, robot))
+        self.winches = winches
+        self.table, self.starts = _tables(winches, diameter)
+        self.rest_strain, self.fewest, self.most = _limits(winches, robot)
 
     def turns(self, length: Array) -> tuple[Array, Array]:
         """Turns on the drums and change of length per turn [m] for lengths off the drums (N, m) [m]; NaN stays NaN."""
@@ -263,7 +255,7 @@ def drum_lever(robot: Robot, length: Array) -> Array:
         step = "Give it in the robot file, or with robot.replace(winches=Winch(drum_radius=...))."
         raise InvalidValueError("winches: drum_radius", "not given", "known if winch speeds are computed", step)
     if winch.groove_pitch is not None and robot.cables.diameter is not None:
-        drums = Drums.of(robot)
+        drums = Drums(robot)
         travel: Array = drums.turns(np.atleast_2d(length) * (1.0 + drums.rest_strain))[1] / (2.0 * np.pi)
         return travel.reshape(length.shape)
     thick = 0.0 if robot.cables.diameter is None else 0.5 * robot.cables.diameter

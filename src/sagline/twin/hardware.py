@@ -40,7 +40,7 @@ class _EncoderScale:
         self.per_meter = each * stretch / (2.0 * np.pi * drum_lever(robot, length))
         self._drums: Drums | None = None
         if winch.groove_pitch is not None and robot.cables.diameter is not None:
-            self._drums = drums = Drums.of(robot)
+            self._drums = drums = Drums(robot)
             self._stretch, self._each = stretch, each
             self._at_no_turns = counts + each * drums.turns((length * stretch)[None])[0][0]
         else:

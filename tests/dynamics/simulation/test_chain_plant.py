@@ -22,7 +22,7 @@ def parts(seed: int) -> tuple[Array, Array, Array, tuple[Array, Array, Array, Ar
 def test_energy_and_momenta_are_sums_over_the_parts(seed: int) -> None:
     inertia, masses, ends, motion = parts(seed)
     place, turning, velocity, spin = motion
-    carrier = _LoadedPlatform.of(inertia, masses, ends)
+    carrier = _LoadedPlatform(inertia, masses, ends)
     state = carrier.state(*motion)
     own = turning @ np.diag(inertia[1:]) @ turning.T
     arms = ends @ turning.T
@@ -49,7 +49,7 @@ def test_energy_and_momenta_are_sums_over_the_parts(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_the_recorded_motion_is_that_of_the_platform(seed: int) -> None:
     inertia, masses, ends, motion = parts(seed)
-    carrier = _LoadedPlatform.of(inertia, masses, ends)
+    carrier = _LoadedPlatform(inertia, masses, ends)
     recorded = np.concatenate((carrier.state(*motion)[: body.MOMENTUM], motion[3]))
     seen = carrier.platform_states(recorded[None])[0]
     assert seen[: body.TURN] == pytest.approx(motion[0])
@@ -61,7 +61,7 @@ def test_the_recorded_motion_is_that_of_the_platform(seed: int) -> None:
 @pytest.mark.parametrize("moments", [[np.inf, np.inf, 2.0], [np.inf] * 3])
 def test_a_point_mass_does_not_rotate(moments: list[float]) -> None:
     _, masses, ends, motion = parts(0)
-    carrier = _LoadedPlatform.of(np.array([10.0, *moments]), masses, ends)
+    carrier = _LoadedPlatform(np.array([10.0, *moments]), masses, ends)
     assert np.isinf(carrier.inertia[1:]).tolist() == np.isinf(moments).tolist()
     assert (carrier.axes == np.eye(3)).all()
     if np.isfinite(moments[2]):

@@ -207,7 +207,7 @@ def test_the_rates_of_a_curve_are_those_of_its_poses() -> None:
     """By differences: each rate is the slope of the previous one, along the parameter and in time."""
     s = np.linspace(0.0, 1.0, 201)
     position = np.stack((np.sin(2 * s), np.cos(3 * s), s**3), axis=1)
-    curve = _SplineCurve.through(sl.Pose.from_euler(position, 0.4 * np.sin(2 * s), 0.5 * s**2, 1.5 * s), s)
+    curve = _SplineCurve(sl.Pose.from_euler(position, 0.4 * np.sin(2 * s), 0.5 * s**2, 1.5 * s), s)
     h = 1e-4
     place = np.linspace(0.2, 0.8, 7)[:, None] + h * np.arange(-1, 2)
     jets = [curve.at(column) for column in place.T]

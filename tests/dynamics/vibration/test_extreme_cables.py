@@ -28,7 +28,7 @@ def test_the_count_agrees_with_component_modes(count: int) -> None:
             continue
         ringing = np.sqrt(max(horizontal, 0.1 * whole) / table[0, 5]) / (2.0 * length)
         up_to = ringing * random.uniform(1.0, 12.0)
-        frequency = np.sqrt(np.maximum(CableComponents.of(strings, 0, 1.3 * up_to).square, 0.0)) / (2.0 * np.pi)
+        frequency = np.sqrt(np.maximum(CableComponents(strings, 0, 1.3 * up_to).square, 0.0)) / (2.0 * np.pi)
         if np.abs(frequency / up_to - 1.0).min() > 1e-5:
             found = int(strings_below(strings, np.array([[up_to]])).sum())
             assert found == (frequency < up_to).sum(), (table, up_to)

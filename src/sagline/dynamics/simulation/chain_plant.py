@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -24,19 +23,19 @@ from sagline.kernels.dynamics.progress import COUNTERS, FAILED
 from sagline.robot.batch import refuse_slanted
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _LoadedPlatform:
-    """Platform together with point masses at its cable ends ("whole body"), in the principal axes of the whole body."""
+    """Platform together with point masses at its cable ends ("whole body"), in the principal axes of the whole body.
 
-    inertia: Array  # mass and principal moments of the whole body, (4,); infinite for a blocked rotation
-    center: Array  # center of the whole body relative to the platform's center of mass, platform axes [m], (3,)
-    axes: Array  # principal axes of the whole body in the principal axes of the platform, one per column, (3, 3)
+    Attributes:
+        inertia: Mass and principal moments of the whole body, (4,); infinite for a blocked rotation.
+        center: Center of the whole body relative to the platform's center of mass, platform axes [m], (3,).
+        axes: Principal axes of the whole body in the principal axes of the platform, one per column, (3, 3).
+    """
 
-    @classmethod
-    def of(cls, inertia: Array, masses: Array, ends: Array) -> _LoadedPlatform:
+    def __init__(self, inertia: Array, masses: Array, ends: Array) -> None:
         """Body of a platform with point masses at its cable ends; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
         mass = inertia[0] + masses.sum()
-        center = (masses @ ends) / mass
+        self.center = center = (masses @ ends) / mass
         turns = np.isfinite(inertia[1:])
         own = np.diag(np.where(turns, inertia[1:], 0.0))
         whole = own + _about(inertia[:1], -center[None]) + _about(masses, ends - center)
@@ -45,7 +44,7 @@ class _LoadedPlatform:
             axes[:, 0] *= np.sign(np.linalg.det(axes))
         else:  # a planar motion, about the last axis, or no rotation
             moments, axes = np.where(turns, np.diag(whole), np.inf), np.eye(3)
-        return cls(np.array([mass, *moments]), center, axes)
+        self.inertia, self.axes = np.array([mass, *moments]), axes
 
     def levers(self, ends: Array) -> Array:
         """Positions on the platform (m, 3) relative to the center of the whole body, in the axes of the whole body."""
@@ -259,7 +258,7 @@ class ChainPlant(Plant):
 
     def _change_body(self, own: Array) -> None:
         """Set the whole body for the present masses; `own` (13,): state of the platform, with angular velocity."""
-        self._carrier = _LoadedPlatform.of(self.inertia, self._carried, self._ends)
+        self._carrier = _LoadedPlatform(self.inertia, self._carried, self._ends)
         turning = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix()
         parts = own[: body.TURN], turning, own[body.VELOCITY : body.MOMENTUM], own[body.MOMENTUM :]
         self.state = self._carrier.state(*parts)

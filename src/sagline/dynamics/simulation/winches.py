@@ -110,7 +110,7 @@ class Encoders:
 
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
         """Create the encoders of a robot with complete drum data; `wound` (m,) [m]; `stretch` (m,)."""
-        drums, m = Drums.of(robot), robot.cable_count
+        drums, m = Drums(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
         self.counts = np.empty(m)  # whole counts, as floats
         offset = drums.winches.count_zero + zero * rate

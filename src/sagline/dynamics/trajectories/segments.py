@@ -43,16 +43,14 @@ class Curve(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _LineCurve:
     """Straight line with a rotation about a fixed axis. The parameter is 0 at the start and 1 at the end."""
 
-    ends: Segments  # a single segment
-
-    @property
-    def direction(self) -> Array:
-        """Twist at unit parameter rate, shape (6,)."""
-        return np.concatenate((self.ends.move[0], self.ends.turn[0]))
+    def __init__(self, pose: Pose) -> None:
+        """Line from the first to the last pose of a batch."""
+        self.ends = Segments(pose[np.array([0, -1])], QUINTIC)  # a single segment
+        # twist at unit parameter rate, shape (6,)
+        self.direction = np.concatenate((self.ends.move[0], self.ends.turn[0]))
 
     def parameter(self, pose: Pose) -> Array:
         """Parameters of poses on the line, shape (N,)."""
@@ -75,15 +73,10 @@ class _LineCurve:
         return Jet(Pose.from_quaternion(position, quaternion), rates)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _SplineCurve:
     """Curve through samples: 5th-degree splines of position and quaternion over its arc length."""
 
-    position: Any  # spline of the position
-    quaternion: Any  # spline of a quaternion, not necessarily of unit length
-
-    @classmethod
-    def through(cls, pose: Pose, parameter: Array) -> _SplineCurve:
+    def __init__(self, pose: Pose, parameter: Array) -> None:
         """Splines through poses at ascending parameters. Poses with nearly the same parameter are left out."""
         from scipy.interpolate import make_interp_spline  # this import takes longer than the rest of motion
 
@@ -95,13 +88,14 @@ class _SplineCurve:
         degree = min(5, len(knots) - 1)
         aligned = np.sum(pose.quaternion[1:] * pose.quaternion[:-1], axis=1) >= 0.0
         sign = np.cumprod(np.append(1.0, np.where(aligned, 1.0, -1.0)))
-        columns = (pose.position, pose.quaternion * sign[:, None])
-        return cls(*(make_interp_spline(parameter[knots], values[knots], k=degree) for values in columns))
+        columns = (pose.position, pose.quaternion * sign[:, None])  # a quaternion need not have unit length
+        splines = (make_interp_spline(parameter[knots], values[knots], k=degree) for values in columns)
+        self._position, self._quaternion = splines
 
     def at(self, parameter: Array) -> Jet:
         """Poses and their derivatives at parameters of shape (N,)."""
-        place = [self.position(parameter, order) for order in range(4)]
-        q = [self.quaternion(parameter, order) for order in range(4)]
+        place = [self._position(parameter, order) for order in range(4)]
+        q = [self._quaternion(parameter, order) for order in range(4)]
         # w = 2 vec(q' q*)/(q . q) for any length of q: numerator, denominator and their derivatives
         top = [2.0 * _vector(q[1], q[0]), 2.0 * _vector(q[2], q[0])]
         top.append(2.0 * _vector(q[3], q[0]) + 2.0 * _vector(q[2], q[1]))
@@ -243,7 +237,7 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
     """Curve through samples, and the parameter at each sample with its derivatives, shape (K, n)."""
-    line = _LineCurve(Segments.between(pose[np.array([0, -1])], QUINTIC))
+    line = _LineCurve(pose)
     if line.ends.moves[0]:
         parameter, square = line.parameter(pose), float(line.direction @ line.direction)
         values = np.stack((parameter, *(rate @ line.direction / square for rate in rates)))
@@ -257,7 +251,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
             return line, values
     way = _arc_lengths(time, *rates[:2])
     way /= way[0, -1]
-    return _SplineCurve.through(pose, way[0]), way
+    return _SplineCurve(pose, way[0]), way
 
 
 def sample_time(path: Path) -> float:

@@ -66,53 +66,44 @@ class PlaneModes(NamedTuple):
     drive: Array  # modal force per acceleration of the platform end, shape (t, k, d)
 
 
-class CableComponents(NamedTuple):
-    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first."""
+class CableComponents:
+    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first.
 
-    square: Array  # squared angular frequencies [1/s^2], shape (T,)
-    cable: Indices  # cable index of each mode, shape (T,)
-    participation: Array  # modal force per acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)]
-    still: Array  # M_0, mass of every cable for quasi-static motion of its end, world axes, shape (m, 3, 3) [kg]
-    plane: PlaneModes  # modes in the cables' planes, grouped by cable
-    normal: PlaneModes  # modes normal to the planes
-    taut: Indices  # indices of the taut cables, shape (t,)
-    table: Array  # rows of the taut cables in the table of strings, shape (t, STRING_COLUMNS)
-    axes: Array  # horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3)
-    omega: float  # highest angular frequency for which the nodes are dense enough [rad/s]
-    points: Array  # material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6)
+    Attributes:
+        square: Squared angular frequencies [1/s^2], shape (T,).
+        cable: Cable index of each mode, shape (T,).
+        participation: Modal force per acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)].
+        still: M_0, mass of every cable for quasi-static motion of its end, world axes, shape (m, 3, 3) [kg].
+        plane: Modes in the cables' planes, grouped by cable.
+        normal: Modes normal to the planes.
+        taut: Indices of the taut cables, shape (t,).
+        table: Rows of the taut cables in the table of strings, shape (t, STRING_COLUMNS).
+        axes: Horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3).
+        omega: Highest angular frequency for which the nodes are dense enough [rad/s].
+        points: Material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6).
+    """
 
-    @classmethod
-    def of(cls, strings: Strings, row: int, up_to: float) -> CableComponents:
-        """Cable modes of one state. Modes up to `up_to` [Hz] are accurate. Higher modes only complete the basis."""
-        # units: up_to [Hz]
-        omega = 2.0 * np.pi * up_to
-        taut = np.flatnonzero(strings.taut[row])
-        table, axes = np.ascontiguousarray(strings.table[row, taut]), strings.axes[row, taut]
-        counts = np.empty(taut.size, dtype=np.int64)
-        spectral.node_counts(table, omega, counts)
-        t, n = taut.size, int(counts.max(initial=2))
-        points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
+    def __init__(self, strings: Strings, row: int, up_to: float) -> None:
+        """Cable modes of the state `row`, accurate up to `up_to` [Hz]. Higher modes only complete the basis."""
+        self.omega, self.taut = 2.0 * np.pi * up_to, np.flatnonzero(strings.taut[row])
+        self.table = np.ascontiguousarray(strings.table[row, self.taut])
+        self.axes = axes = strings.axes[row, self.taut]
+        counts = np.empty(self.taut.size, dtype=np.int64)
+        spectral.node_counts(self.table, self.omega, counts)
+        t, n = self.taut.size, int(counts.max(initial=2))
+        self.points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
         plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
-        spectral.spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
+        spectral.spectral_matrices(self.table, self.omega, _lobatto(), self.points, plane, normal, carried, mass)
         free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is fixed
-        first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
+        first = 0 if self.table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
         inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
         aside = _motions(normal, carried[:, :, 4:], free, first)
-        swings = inside.drive @ axes[:, ::2]
-        sways = aside.drive @ axes[:, 1:2]
-        return cls(
-            np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1))),
-            np.concatenate((np.repeat(taut, inside.square.shape[1]), np.repeat(taut, aside.square.shape[1]))),
-            np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3))),
-            _still(mass, axes, taut, strings.taut.shape[1]),
-            inside,
-            aside,
-            taut,
-            table,
-            axes,
-            omega,
-            points,
-        )
+        self.plane, self.normal = inside, aside
+        self.square = np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1)))
+        self.cable = np.concatenate([np.repeat(self.taut, modes.square.shape[1]) for modes in (inside, aside)])
+        swings, sways = inside.drive @ axes[:, ::2], aside.drive @ axes[:, 1:2]
+        self.participation = np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3)))
+        self.still = _still(mass, axes, self.taut, strings.taut.shape[1])
 
     @property
     def density(self) -> Array:

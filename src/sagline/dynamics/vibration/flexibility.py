@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.core.arrays import Array, Flags
+from sagline.cables.model import CableState
+from sagline.core.arrays import Array
 from sagline.kernels.dynamics import string as columns
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes, motions_of_ends
@@ -31,30 +32,30 @@ class Flexibility(NamedTuple):
     stretch: Array  # stretch part: integral of t t^T/EA ds with the tangent t [m/N], shape (..., m, 3, 3)
 
 
-class _CatenaryState(NamedTuple):
-    """Cables in their planes, fields of shape (..., m)."""
+class _CatenaryState:
+    """Cables in their planes, fields of shape (..., m).
 
-    h: Array  # horizontal force [N]
-    a: Array  # vertical force at the frame end [N]
-    b: Array  # vertical force at the platform end [N]
-    size_a: Array  # tension at the frame end [N]
-    size_b: Array  # tension at the platform end [N]
-    weight: Array  # weight per length [N/m]
-    length: Array  # unstrained length [m]
+    Attributes:
+        h: Horizontal force [N].
+        a: Vertical force at the frame end [N].
+        b: Vertical force at the platform end [N].
+        size_a: Tension at the frame end [N].
+        size_b: Tension at the platform end [N].
+        weight: Weight per length [N/m].
+        length: Unstrained length [m].
+        product: N_A N_B, product of the tensions at the ends [N^2].
+        slope: Mean slope (V_A + V_B)/(N_A + N_B).
+        smooth: True for nearly straight cables.
+    """
 
-    @property
-    def product(self) -> Array:
-        return self.size_a * self.size_b
-
-    @property
-    def slope(self) -> Array:
-        """Ratio (N_B - N_A)/(w L)."""
-        return (self.a + self.b) / (self.size_a + self.size_b)
-
-    @property
-    def smooth(self) -> Flags:
-        """True for cables whose force is nearly constant along their length."""
-        return self.weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
+    def __init__(self, cables: CableState, weight: Array) -> None:
+        self.weight, self.length = weight, cables.unstrained_length
+        self.h, self.b = cables.horizontal_tension, cables.vertical_force
+        self.a = self.b - weight * self.length
+        self.size_a, self.size_b = np.hypot(self.h, self.a), np.hypot(self.h, self.b)
+        self.product = self.size_a * self.size_b
+        self.slope = (self.a + self.b) / (self.size_a + self.size_b)
+        self.smooth = weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
 
 
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
@@ -65,14 +66,12 @@ def flexibility(state: Equilibrium, force: Array) -> Flexibility:
     stiffness = np.broadcast_to(cables.cable.axial_stiffness, length.shape)
     gravity = 0.0 if cables.model.weightless else cables.gravity
     weight = gravity * np.broadcast_to(cables.cable.linear_density, length.shape)
-    level, vertical = cables.horizontal_tension, cables.vertical_force
-    below = vertical - weight * length
-    hung = _CatenaryState(level, below, vertical, np.hypot(level, below), np.hypot(level, vertical), weight, length)
     axes = _axes(force)
-    slack = (hung.size_b == 0.0) & (weight == 0.0)
     with np.errstate(all="ignore"):
+        hung = _CatenaryState(cables, weight)
+        slack = (hung.size_b == 0.0) & (weight == 0.0)
         by_force, by_weight, outer = _by_force(hung), _by_weight(hung), _outer(hung)
-        by_length = flexibility_per_length(np.stack((level, np.zeros_like(level), below), axis=-1), stiffness)
+        by_length = flexibility_per_length(np.stack((hung.h, np.zeros_like(hung.h), hung.a), axis=-1), stiffness)
 
     def world(matrix: Array) -> Array:
         held = np.where(slack[..., None, None], 0.0, matrix)

@@ -148,20 +148,19 @@ def _numbers_of_pose(
     freedom = model.freedom
     rest = compliance_of(freedom, model.stiffness[row, None])[0, :3, :3]
     found = model.modes(row, up_to)
-    if not found.number:
+    if not found.frequency.size:
         return np.nan, lowest, np.nan, float(np.linalg.norm(rest, 2)), 0.0
     first = found.platform[:, 0]
     receptance = _modal_receptance(found, rest, damping.modal_damping)
     if damping.loss_time > 0.0 or damping.air_damping > 0.0:
-        slopes = cable_slopes(state[row])
-        exact = Receptance(model.at(row), slopes.matrix, slopes.blocks, damping)
+        exact = Receptance(model.at(row), cable_slopes(state[row]), damping)
         held = exact.fixed_end_modes(up_to)
 
         def receptance(frequency: Array) -> Complex:
             """Receptance for losses that couple the modes."""
             return exact.by_modes(frequency, held)[0][:, :3, :3]
 
-    shares = found.cable_shares() if damping.air_damping > 0.0 else np.zeros((0, found.number))
+    shares = found.cable_shares() if damping.air_damping > 0.0 else np.zeros((0, found.frequency.size))
     ratios = found.damping_ratios(state.one_robot.cables.linear_density[: len(shares)], shares, damping)
     peak, at = _peak_receptance(receptance, found.frequency, ratios, damping)
     return float(found.frequency[0]), lowest, float(first @ model.mass[row] @ first), peak, at

@@ -18,7 +18,7 @@ from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.kernels.dynamics.collocation import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.kernels.dynamics.string import SMOOTH, TINY
 from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of, of_result
-from sagline.statics.slopes import CableSlopes, cable_slopes, motions_of_ends
+from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import mass_matrix, modes, stiffness
 
 
@@ -103,7 +103,7 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
     if vibrating is not None and vibrating.status is not VibrationStatus.SOLVED:
         told = f"a vibration with the status {vibrating.status.name}"
         raise InvalidValueError("state", told, "a vibration that was solved", "Use its state for massless frequencies.")
-    rest = _Rest.of(equilibrium_of(state) if vibrating is None else vibrating.state)
+    rest = _Rest(equilibrium_of(state) if vibrating is None else vibrating.state)
     found = modes(rest.state) if vibrating is None else vibrating
     groups = list(_groups(found.frequency, together))
     if vibrating is None:
@@ -150,19 +150,10 @@ def _parting(form: Array, frequency: Array) -> Array:
     return np.asarray(np.moveaxis(squares, -1, 0) / (8.0 * np.pi**2 * frequency.mean()))
 
 
-class _Rest(NamedTuple):
+class _Rest:
     """State, and derivatives of its equilibrium."""
 
-    state: Equilibrium  # the state, a single one
-    slopes: CableSlopes  # derivatives of cable forces
-    # derivatives of platform-end forces with respect to length, density and axial stiffness, shape (3, m, 3)
-    by_datum: Array
-    settling: Array  # derivatives of the equilibrium motion with respect to the same data, shape (3, 6, m)
-    compliance: Array  # shape (6, 6)
-    mass: Array  # mass matrix of the platform, shape (6, 6)
-
-    @classmethod
-    def of(cls, state: Equilibrium) -> _Rest:
+    def __init__(self, state: Equilibrium) -> None:
         """Compute force derivatives, compliance and mass of a state, which is checked first."""
         check_model(single_state(state))
         if state.contact is not None:
@@ -173,9 +164,12 @@ class _Rest(NamedTuple):
             raise InvalidValueError("state", value, "cables from frame anchors", step)
         check_solved(state)
         slopes, known = cable_slopes(state), stiffness(state)
-        by_datum = np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness))
-        settling = np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity))
-        return cls(state, slopes, by_datum, settling, known.compliance, mass_matrix(state))
+        self.state, self.slopes = state, slopes  # slopes: derivatives of cable forces
+        # derivatives of platform-end forces with respect to length, density and axial stiffness, shape (3, m, 3)
+        self.by_datum = np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness))
+        # derivatives of the equilibrium motion with respect to the same data, shape (3, 6, m)
+        self.settling = np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity))
+        self.compliance, self.mass = known.compliance, mass_matrix(state)  # (6, 6) each; mass: of the platform
 
 
 class _ModeGroup(NamedTuple):
@@ -254,15 +248,42 @@ class _StringData(NamedTuple):
     density: float
 
 
-class _Waves(NamedTuple):
-    """Displacement and force along a cable for each component of the force on its frame end."""
+class _Waves:
+    """Waves of a cable due to unit forces on its frame end: displacement and force for each component of the force.
 
-    force: Array  # force in the cable at rest, shape (P, 3) [N]
-    below: Array  # length from the point to the platform end, shape (P,) [m]
-    share: Array  # length of cable that the point represents, shape (P,) [m]
-    moved: Array  # displacement, one column per force component, shape (P, 3, 3)
-    pulled: Array  # change of the force, shape (P, 3, 3)
-    end: Array  # displacement and force at the platform end, shape (2, 3, 3)
+    Attributes:
+        force: Force in the cable at rest, shape (P, 3) [N].
+        below: Length from the point to the platform end, shape (P,) [m].
+        share: Length of cable that the point represents, shape (P,) [m].
+        moved: Displacement, one column per force component, shape (P, 3, 3).
+        pulled: Change of the force, shape (P, 3, 3).
+        end: Displacement and force at the platform end, shape (2, 3, 3).
+    """
+
+    def __init__(self, cable: _StringData, omega: float) -> None:
+        """Solve by collocation at Gauss points of the cable's elements."""
+        edges = _edges(cable, omega)
+        size = np.diff(edges)
+        place = edges[:-1, None] + size[:, None] * NODES  # (e, STAGES)
+        below = cable.length - place
+        force = cable.force - cable.weight * below[..., None] * _UP
+        rates = np.zeros((*place.shape, 6, 6))
+        rates[..., :3, 3:] = flexibility_per_length(force, cable.stiffness)
+        rates[..., 3:, :3] = -cable.density * omega**2 * np.eye(3)
+        within = np.einsum("e,st,etij->esitj", size, INTEGRALS, rates).reshape(len(size), 6 * STAGES, 6 * STAGES)
+        start = np.tile(np.eye(6), (STAGES, 1))
+        stages = np.linalg.solve(np.eye(6 * STAGES) - within, np.broadcast_to(start, (len(size), *start.shape)))
+        stages = stages.reshape(len(size), STAGES, 6, 6)
+        across = np.eye(6) + np.einsum("e,s,esij,esjk->eik", size, WEIGHTS, rates, stages, optimize=True)
+        at = np.concatenate((np.zeros((3, 3)), np.eye(3)))
+        within_each = np.empty((len(size), STAGES, 6, 3))
+        for e in range(len(size)):
+            within_each[e] = stages[e] @ at
+            at = across[e] @ at
+        found = within_each.reshape(-1, 6, 3)
+        self.force, self.below = force.reshape(-1, 3), below.reshape(-1)
+        self.share = (size[:, None] * WEIGHTS).reshape(-1)
+        self.moved, self.pulled, self.end = found[:, :3], found[:, 3:], at.reshape(2, 3, 3)
 
 
 def _string_data(rest: _Rest) -> tuple[_StringData, ...]:
@@ -281,7 +302,7 @@ def _mode_group(rest: _Rest, cables: tuple[_StringData, ...], frequency: Array) 
     """Modes of the adjacent frequencies `frequency` [Hz], which count as equal."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
     omega *= 1.0 + _correction(rest, cables, omega, group)  # this step multiplies the error by the factor CLOSE
-    waves = [_waves(cable, omega) for cable in cables]
+    waves = [_Waves(cable, omega) for cable in cables]
     matrix, scale = _equations(rest, waves, omega)
     vectors = scale[:, None] * np.linalg.svd(matrix)[2][-group:].T
     freedom = rest.state.one_robot.freedom
@@ -297,9 +318,9 @@ def _mode_group(rest: _Rest, cables: tuple[_StringData, ...], frequency: Array) 
 
 def _correction(rest: _Rest, cables: tuple[_StringData, ...], omega: float, group: int) -> float:
     """Relative error of a frequency, to first order, from the singular values of the equations."""
-    matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
+    matrix, scale = _equations(rest, [_Waves(cable, omega) for cable in cables], omega)
     near = omega * (1.0 + CLOSE)
-    other, _ = _equations(rest, [_waves(cable, near) for cable in cables], near, scale)
+    other, _ = _equations(rest, [_Waves(cable, near) for cable in cables], near, scale)
     left, values, right = np.linalg.svd(matrix)
     left, right = left[:, -group:], right[-group:]
     change = left.T @ (other - matrix) @ right.T / CLOSE
@@ -322,31 +343,6 @@ def _equations(rest: _Rest, waves: list[_Waves], omega: float, scale: Array | No
     matrix[:n] /= np.abs(rest.slopes.matrix).max()
     scale = 1.0 / np.linalg.norm(matrix, axis=0) if scale is None else scale
     return matrix * scale, scale
-
-
-def _waves(cable: _StringData, omega: float) -> _Waves:
-    """Waves of a cable due to unit forces on its frame end, by collocation at Gauss points of its elements."""
-    edges = _edges(cable, omega)
-    size = np.diff(edges)
-    place = edges[:-1, None] + size[:, None] * NODES  # (e, STAGES)
-    below = cable.length - place
-    force = cable.force - cable.weight * below[..., None] * _UP
-    rates = np.zeros((*place.shape, 6, 6))
-    rates[..., :3, 3:] = flexibility_per_length(force, cable.stiffness)
-    rates[..., 3:, :3] = -cable.density * omega**2 * np.eye(3)
-    within = np.einsum("e,st,etij->esitj", size, INTEGRALS, rates).reshape(len(size), 6 * STAGES, 6 * STAGES)
-    start = np.tile(np.eye(6), (STAGES, 1))
-    stages = np.linalg.solve(np.eye(6 * STAGES) - within, np.broadcast_to(start, (len(size), *start.shape)))
-    stages = stages.reshape(len(size), STAGES, 6, 6)
-    across = np.eye(6) + np.einsum("e,s,esij,esjk->eik", size, WEIGHTS, rates, stages, optimize=True)
-    at = np.concatenate((np.zeros((3, 3)), np.eye(3)))
-    within_each = np.empty((len(size), STAGES, 6, 3))
-    for e in range(len(size)):
-        within_each[e] = stages[e] @ at
-        at = across[e] @ at
-    found = within_each.reshape(-1, 6, 3)
-    share = (size[:, None] * WEIGHTS).reshape(-1)
-    return _Waves(force.reshape(-1, 3), below.reshape(-1), share, found[:, :3], found[:, 3:], at.reshape(2, 3, 3))
 
 
 def _edges(cable: _StringData, omega: float) -> Array:

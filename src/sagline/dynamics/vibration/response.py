@@ -24,7 +24,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import (
 from sagline.dynamics.vibration.robot_modes import VibrationModel
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
-from sagline.statics.slopes import cable_slopes
+from sagline.statics.slopes import CableSlopes, cable_slopes
 from sagline.statics.stiffness import modes, stiffness
 
 LOWEST: Final = 1.0  # [Hz], modes up to this frequency are always included
@@ -38,17 +38,19 @@ BLOCK: Final = 128  # frequencies per block
 FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]
 
 
-class Receptance(NamedTuple):
+class Receptance:
     """Model of the platform's receptance."""
 
-    model: VibrationModel  # model of one state, with a leading axis 1
-    matrix: Array  # stiffness of the platform, not symmetric with an external moment, shape (6, 6)
-    cables: Array  # stiffness of the cables at their platform ends, shape (m, 3, 3)
-    damping: Damping  # energy losses
+    def __init__(self, model: VibrationModel, slopes: CableSlopes, damping: Damping) -> None:
+        """Model of one state, with a leading axis 1, and derivatives of its cable forces."""
+        self.model, self.damping = model, damping
+        # matrix: stiffness of the platform, not symmetric with an external moment, shape (6, 6)
+        # cables: stiffness of the cables at their platform ends, shape (m, 3, 3)
+        self.matrix, self.cables = slopes.matrix, slopes.blocks
 
     def fixed_end_modes(self, up_to: float) -> FixedEndModes:
         """Fixed-end modes of the cables up to the frequency `up_to` [Hz]."""
-        components = CableComponents.of(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
+        components = CableComponents(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
         return components, components.stretch_stiffness() if self.damping.loss_time > 0.0 else None
 
     def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
@@ -211,8 +213,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     if model.massless_modes(0)[1].shape[1]:
         step = "Simulate it; vibration() names the unstable directions."
         raise InvalidValueError("state", "an unstable equilibrium", "a stable equilibrium, which has a response", step)
-    slopes = cable_slopes(state)
-    receptance = Receptance(model, slopes.matrix, slopes.blocks, known)
+    receptance = Receptance(model, cable_slopes(state), known)
     compliance, still = receptance.by_modes(given, receptance.fixed_end_modes(highest))
     some = evenly_spaced(given.size, CHECKS)
     wanted = receptance.exact(given[some])

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.core.arrays import Array, Flags
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.dynamics.vibration.component_modes import CableComponents
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, taut_stiffness
@@ -48,33 +48,6 @@ class VibrationModel(NamedTuple):
         strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
         return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
 
-    def reduced(self, row: int, up_to: float) -> _ReducedModel:
-        """Eigenproblem of the state `row` for its modes below `up_to` [Hz]."""
-        # The unknowns are the modes of the cables up to slightly above this frequency. A few joint motions represent
-        # the response of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes
-        # are relative to the frame. The mass of the platform unknowns is the platform mass plus the remaining
-        # quasi-static mass of the cables. The mass of each mode is 1.
-        components = CableComponents.of(self.strings, row, KEPT * up_to)
-        freedom, ends = self.freedom, self.ends[row]
-        drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
-        kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
-        beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
-        square, count = components.square[kept], int(kept.sum())
-        drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
-        at_rest = freedom @ (self.mass[row] + _on_platform(components.still, ends)) @ freedom.T
-        upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
-        driven = drives @ upper
-        pulled = np.concatenate((square[:, None] * driven[:count], slow @ driven[count:]))
-        n = len(freedom)
-        matrix = np.zeros((n + len(driven), n + len(driven)))
-        stiffness = freedom @ self.stiffness[row] @ freedom.T
-        matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
-        matrix[n:, :n] = -pulled
-        matrix[:n, n:] = -pulled.T
-        np.fill_diagonal(matrix[n : n + count, n : n + count], square)
-        matrix[n + count :, n + count :] = slow
-        return _ReducedModel(matrix, freedom.T @ upper, driven, kept, beyond, components)
-
     def massless_modes(self, row: int) -> tuple[Array, Array]:
         """Natural frequencies with massless cables (n,) [Hz], and unstable directions of the platform (6, d)."""
         freedom = self.freedom
@@ -104,7 +77,7 @@ class VibrationModel(NamedTuple):
         """Modes of the state `row` below `up_to` [Hz]. The exact count checks the number of modes."""
         _check_string_count(self.strings, row, up_to)
         count = self.checked_count(row, up_to, "up_to")
-        problem = self.reduced(row, up_to)
+        problem = _ReducedModel(self, row, up_to)
         square, vectors = np.linalg.eigh(problem.matrix)
         frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
         border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
@@ -116,18 +89,48 @@ class VibrationModel(NamedTuple):
             frequency[: np.count_nonzero(self.massless_modes(row)[0] == 0.0)] = 0.0
         vectors = vectors[:, :count]
         platform = problem.platform @ vectors[: problem.platform.shape[1]]
-        return StateModes(frequency[:count], platform, self.ends[row] @ platform, count, problem, vectors)
+        return StateModes(frequency[:count], platform, self.ends[row] @ platform, problem, vectors)
 
 
-class _ReducedModel(NamedTuple):
-    """Eigenproblem of one state."""
+class _ReducedModel:
+    """Eigenproblem of one state for its modes below a frequency.
 
-    matrix: Array  # symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2]
-    platform: Array  # matrix that maps the first n unknowns to platform motions, shape (6, n)
-    driven: Array  # matrix that maps the first n unknowns to the excitation of the cable modes, shape (k, n)
-    kept: Flags  # mask of the components that are unknowns themselves, shape (T,)
-    beyond: Array  # other components as combinations of the last b unknowns, shape (T - kept, b)
-    components: CableComponents  # fixed-end modes of the cables
+    Attributes:
+        matrix: Symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2].
+        platform: Matrix that maps the first n unknowns to platform motions, shape (6, n).
+        driven: Matrix that maps the first n unknowns to the excitation of the cable modes, shape (k, n).
+        kept: Mask of the components that are unknowns themselves, shape (T,).
+        beyond: Other components as combinations of the last b unknowns, shape (T - kept, b).
+        components: Fixed-end modes of the cables.
+    """
+
+    def __init__(self, model: VibrationModel, row: int, up_to: float) -> None:
+        """Reduce the state `row` of the model, for modes below `up_to` [Hz]."""
+        # The unknowns are the modes of the cables up to slightly above this frequency. A few joint motions represent
+        # the response of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes
+        # are relative to the frame. The mass of the platform unknowns is the platform mass plus the remaining
+        # quasi-static mass of the cables. The mass of each mode is 1.
+        components = CableComponents(model.strings, row, KEPT * up_to)
+        freedom, ends = model.freedom, model.ends[row]
+        drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
+        kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
+        beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
+        square, count = components.square[kept], int(kept.sum())
+        drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
+        at_rest = freedom @ (model.mass[row] + _on_platform(components.still, ends)) @ freedom.T
+        upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
+        driven = drives @ upper
+        pulled = np.concatenate((square[:, None] * driven[:count], slow @ driven[count:]))
+        n = len(freedom)
+        matrix = np.zeros((n + len(driven), n + len(driven)))
+        stiffness = freedom @ model.stiffness[row] @ freedom.T
+        matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
+        matrix[n:, :n] = -pulled
+        matrix[:n, n:] = -pulled.T
+        np.fill_diagonal(matrix[n : n + count, n : n + count], square)
+        matrix[n + count :, n + count :] = slow
+        self.matrix, self.platform, self.driven = matrix, freedom.T @ upper, driven
+        self.kept, self.beyond, self.components = kept, beyond, components
 
     def amplitudes(self, vectors: Array) -> Array:
         """Amplitudes (T, K) of the components in addition to quasi-static motion, from vectors (n + k, K)."""
@@ -175,10 +178,9 @@ BORDER: Final = 1e-6  # relative accuracy of a frequency in the count
 class StateModes:
     """Modes of one state below a frequency."""
 
-    frequency: Array  # [Hz], shape (K,)
+    frequency: Array  # [Hz], shape (K,); K is the exact count
     platform: Array  # platform motion, shape (6, K)
     ends: Array  # displacements of the platform ends, shape (m, 3, K)
-    number: int  # number of modes by the exact count
     problem: _ReducedModel  # reduced model of the modes
     vectors: Array  # eigenvectors of the reduced model, shape (n + k, K)
 

@@ -200,7 +200,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
     }
     if status in WITH_MODES:
         found = model.modes(0, limit)
-        shares, count = found.cable_shares(), found.number
+        shares, count = found.cable_shares(), found.frequency.size
         arrays |= {
             "frequency": found.frequency,
             "shape": found.platform,
