@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from sagline import Cable, InvalidValueError
-from sagline.article.feasible_sets import feasible_sets
+from sagline.article.feasible_sets import FeasibleSets
 from sagline.article.regressions import (
+    SagStudy,
     Sampling,
     article_sampling,
     constants,
@@ -12,7 +13,6 @@ from sagline.article.regressions import (
     intercept_studies,
     published_range,
     published_sampling,
-    sag_study,
     stretch_study,
 )
 from tests.article.hanging import GRAVITY, end_of, length_and_force
@@ -35,7 +35,7 @@ def test_lines_and_factors_agree_with_numpy() -> None:
 
 
 def test_every_tension_on_the_outline_of_psi_misses_by_the_tolerance() -> None:
-    study = feasible_sets(CABLE, END, 0.01, np.linspace(10.0, 100.0, 5), np.array([15.0, 40.0]), points=16)
+    study = FeasibleSets(CABLE, END, 0.01, np.linspace(10.0, 100.0, 5), np.array([15.0, 40.0]), points=16)
     for length, outline in zip(study.psi_lengths, study.psi, strict=True):
         for horizontal, vertical in outline:
             x, z = end_of(horizontal, vertical, length, 0.067 * GRAVITY, 44e3)
@@ -43,20 +43,20 @@ def test_every_tension_on_the_outline_of_psi_misses_by_the_tolerance() -> None:
 
 
 def test_psi_shrinks_to_a_point_and_the_curve_runs_through_it() -> None:
-    wide, narrow = (feasible_sets(CABLE, END, e, np.array([80.0, 90.0]), np.array([80.0])) for e in (1e-3, 1e-5))
+    wide, narrow = (FeasibleSets(CABLE, END, e, np.array([80.0, 90.0]), np.array([80.0])) for e in (1e-3, 1e-5))
     assert np.ptp(wide.psi[0, :, 0]) / np.ptp(narrow.psi[0, :, 0]) == pytest.approx(100.0, rel=1e-3)
     assert narrow.psi[0, :, 0].mean() == pytest.approx(80.0, abs=0.02)
     assert narrow.psi[0, :, 1].mean() == pytest.approx(narrow.vertical[0], abs=0.02)
 
 
 def test_the_projected_curve_is_nearly_the_line_pi() -> None:
-    study = feasible_sets(CABLE, END, 1e-3, np.linspace(50.0, 500.0, 40), np.array([80.0]))
+    study = FeasibleSets(CABLE, END, 1e-3, np.linspace(50.0, 500.0, 40), np.array([80.0]))
     slope, intercept = study.line
     assert slope == pytest.approx(study.tangent, rel=1e-3)
     assert intercept == pytest.approx(study.half_weight, rel=0.02)
     assert np.abs(study.vertical - slope * study.tensions - intercept).max() < 0.02
     with refused("points", "10", "a multiple of 4", kind=InvalidValueError):
-        feasible_sets(CABLE, END, 1e-3, np.array([50.0, 60.0]), np.array([80.0]), points=10)
+        FeasibleSets(CABLE, END, 1e-3, np.array([50.0, 60.0]), np.array([80.0]), points=10)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_both_studies_repeat_the_articles_regressions_on_textbook_catenaries(sma
             assert study.intercept[index] == pytest.approx(intercept, rel=1e-6)
         h_b = np.linalg.lstsq(small.chords[:, None], study.intercept[1, :, 0])[0][0]
         assert study.h_b[1, 0] == pytest.approx(h_b, rel=1e-9)
-    sag = sag_study(small)
+    sag = SagStudy(small)
     np.testing.assert_allclose(sag.adjusting_length, length - chord, rtol=1e-7)
     a_d = np.linalg.lstsq(small.tensions[:, None] ** -2.0, (length - chord)[1, 2, 0])[0][0]
     assert sag.a_d[1, 2, 0] == pytest.approx(a_d, rel=1e-7)
@@ -114,7 +114,7 @@ def test_the_constants_depend_on_the_tensions_and_tend_to_their_limits() -> None
 def test_the_sag_of_a_taut_cable_is_proportional_to_the_fourth_power_of_the_cosine() -> None:
     """d = D (w D cos(phi))^2/(24 tau^2) with tau = T_x/cos(phi), the limit of the textbook catenary."""
     taut = published_sampling().between(10_000.0, 100_000.0)
-    study = sag_study(taut)
+    study = SagStudy(taut)
     limit = (GRAVITY * taut.densities) ** 2 / 24.0 * np.cos(taut.angles[:, None]) ** 4
     cubes = limit[:, None] * taut.chords[:, None] ** 3
     # rounding of a difference of lengths, and the next term of the series

@@ -22,7 +22,7 @@ from sagline.article.explanations import (
     explanations,
     rest_positions,
 )
-from sagline.article.ten_poses import METHOD, TenPoses, ten_poses
+from sagline.article.ten_poses import METHOD, TenPoses
 from sagline.core.arrays import Array
 from tests.tiers import extended
 
@@ -33,7 +33,7 @@ ROBOT = sl.load_robot("article-prototype")
 
 @pytest.fixture(scope="module")
 def study() -> TenPoses:
-    return ten_poses()
+    return TenPoses()
 
 
 def left(study: TenPoses, pulley: float, zero: float, dead: float = 0.0) -> Array:

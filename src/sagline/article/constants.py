@@ -168,7 +168,7 @@ def sag_chapter() -> Chapter:
     """Chapter about the regressions that lead from the adjusting length to k_p."""
     end = fits.end_at_angle(CHORD)
     stiff, soft, printed, right = fits.stretch_study(fits.simulated_cable(), end, TENSIONS)
-    sag = fits.sag_study(fits.published_sampling())
+    sag = fits.SagStudy(fits.published_sampling())
     fitted = [find(sag) for find in (_tension, _chord, _angle, _density)]
     return chapter("sag", [_with_stretch(stiff, soft), _relieved(stiff, printed, right), *fitted], chord=CHORD)
 

@@ -170,7 +170,7 @@ def _stretch_by_end_tension() -> Sequence[Number]:
 def _sag_constant() -> Sequence[Number]:
     """Erratum 6: for cables with a small sag, k_p is g^2/24, not 4.385."""
     sampling = fits.article_sampling()
-    taut = fits.sag_study(sampling.between(*(TAUTER * sampling.tensions[[0, -1]])))
+    taut = fits.SagStudy(sampling.between(*(TAUTER * sampling.tensions[[0, -1]])))
     return (
         ("g²/24", fits.SHALLOW_K_P, "m²/s⁴"),
         ("k_p by the article's regressions, taut cables", taut.k_p, "m²/s⁴"),

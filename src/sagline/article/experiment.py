@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from math import dist
 from typing import Final
@@ -16,9 +15,9 @@ import numpy as np
 
 import sagline as sl
 from sagline import control
-from sagline.article.ten_poses import HOME, Table2, table2
+from sagline.article.ten_poses import HOME, table2
 from sagline.control.link import PERIOD
-from sagline.core.arrays import Array, locked
+from sagline.core.arrays import Array
 from sagline.core.results import Status
 
 PROTOTYPE: Final = "article-prototype"
@@ -92,32 +91,58 @@ class StopObserver:
         return tuple(np.mean(rows, axis=0) for rows in zip(*self._seen, strict=True))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
-    """Result of the experiment; the time series have K points, and the robot has m winches."""
+    """Result of the experiment; the time series have K points, and the robot has m winches.
 
-    table: Table2
-    robot: sl.Robot  # robot used by the controller
-    true: Array  # true positions of the platform at the ten stops [m], shape (10, 3)
-    estimated: Array  # positions estimated from the encoders at the stops [m], shape (10, 3)
-    tension: Array  # measured tensions at the stops, as means over a second [N], shape (10, m)
-    planned_tension: Array  # planned tensions at the stops [N], shape (10, m)
-    # largest tension error of a cable in the null space, which length changes can correct without motion [N], shape
-    # (10,)
-    null_error: Array
-    correction: Array  # correction of the lengths by the tension loop at the stops [m], shape (10, m)
-    back: Array  # final minus initial position of the platform at home [m], shape (3,)
-    time: Array  # time of motion, without the stops [s], shape (K,)
-    cells: Array  # measured tensions [N], shape (K, m)
-    planned: Array  # planned tensions [N], shape (K, m)
-    lengths: Array  # lengths minus lengths at home [m], shape (K, m)
-    stops: Array  # times of the ten stops on the time axis `time`, shape (10,)
-    duration: float  # duration from home to home, including stops [s]
-    winch_speed: float  # largest speed of a winch [m/s]
-    farthest: float  # largest distance between true position and set point in motion [m]
-    misjudged: float  # largest distance between true and estimated position [m]
-    acting: float  # share of the cycles at stops in which the tension loop changes the lengths
-    events: tuple[control.Event, ...]  # events of the controller
+    Attributes:
+        table: Values of the article.
+        robot: Robot used by the controller.
+        true: True positions of the platform at the ten stops [m], shape (10, 3).
+        estimated: Positions estimated from the encoders at the stops [m], shape (10, 3).
+        tension: Measured tensions at the stops, as means over a second [N], shape (10, m).
+        planned_tension: Planned tensions at the stops [N], shape (10, m).
+        null_error: Largest tension error of a cable in the null space, which length changes can correct without motion
+            [N], shape (10,).
+        correction: Correction of the lengths by the tension loop at the stops [m], shape (10, m).
+        back: Final minus initial position of the platform at home [m], shape (3,).
+        time: Time of motion, without the stops [s], shape (K,).
+        cells: Measured tensions [N], shape (K, m).
+        planned: Planned tensions [N], shape (K, m).
+        lengths: Lengths minus lengths at home [m], shape (K, m).
+        stops: Times of the ten stops on the time axis `time`, shape (10,).
+        duration: Duration from home to home, including stops [s].
+        winch_speed: Largest speed of a winch [m/s].
+        farthest: Largest distance between true position and set point in motion [m].
+        misjudged: Largest distance between true and estimated position [m].
+        acting: Share of the cycles at stops in which the tension loop changes the lengths.
+        events: Events of the controller.
+    """
+
+    def __init__(
+        self,
+        controller: control.Controller,
+        watch: StopObserver,
+        stops: Sequence[tuple[Array, ...]],
+        plans: Sequence[sl.Plan],
+        ends: Array,
+    ) -> None:
+        """Evaluate observations at the stops, plans of the legs, and times (12,) of the ends of the legs."""
+        self.table, self.robot, m = table2(), controller.robot, controller.robot.cable_count
+        true, estimated, tension, correction = (np.array(column) for column in zip(*stops[1:], strict=True))
+        planned = np.array([plan.state.cables.frame_end_tension[-1] for plan in plans])
+        seen = [
+            control.null_space(plan.state[-1]).visible @ off for plan, off in zip(plans, tension - planned, strict=True)
+        ]
+        self.true, self.estimated, self.tension = true[:-1], estimated[:-1], tension[:-1]
+        self.planned_tension, self.correction = planned[:-1], correction[:-1]
+        self.null_error, self.back = np.abs(seen[:-1]).max(axis=1), true[-1] - stops[0][0]
+        time, self.cells, self.planned, lengths = np.split(np.array(watch.courses), [1, 1 + m, 1 + 2 * m], axis=1)
+        self.time, self.lengths, self.stops = time[:, 0], lengths - plans[0].unstrained_length[0], ends[1:-1]
+        self.duration = PERIOD * watch.cycles
+        rates = [plan.length_rate for plan in plans]
+        self.winch_speed = max(float(np.abs(rate).max()) for rate in rates if rate is not None)
+        self.farthest, self.misjudged, self.acting = watch.farthest, watch.misjudged, watch.acted / watch.stood
+        self.events = controller.events
 
     @property
     def error(self) -> Array:
@@ -174,7 +199,7 @@ def experiment(controller: control.Controller, watch: StopObserver) -> Experimen
         _stand(controller, name)
         stops.append(watch.seen())
     controller.off()
-    return _result(controller, watch, stops, plans, np.array(ends))
+    return Experiment(controller, watch, stops, plans, np.array(ends))
 
 
 def _executed(controller: control.Controller, leg: sl.Path, name: str) -> control.Execution:
@@ -203,42 +228,6 @@ def _ended(controller: control.Controller, where: str) -> control.RefusedError:
     faults = [event.text for event in controller.events if event.kind is control.EventKind.FAULT]
     reason = faults[-1] if faults else controller.events[-1].text
     return control.RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
-
-
-def _result(
-    controller: control.Controller,
-    watch: StopObserver,
-    stops: Sequence[tuple[Array, ...]],
-    plans: Sequence[sl.Plan],
-    ends: Array,
-) -> Experiment:
-    m = controller.robot.cable_count
-    true, estimated, tension, correction = (np.array(column) for column in zip(*stops[1:], strict=True))
-    planned = np.array([plan.state.cables.frame_end_tension[-1] for plan in plans])
-    seen = [
-        control.null_space(plan.state[-1]).visible @ off for plan, off in zip(plans, tension - planned, strict=True)
-    ]
-    rates = [plan.length_rate for plan in plans]
-    time, cells, expected, lengths = np.split(np.array(watch.courses), [1, 1 + m, 1 + 2 * m], axis=1)
-    at_stops = {"true": true, "estimated": estimated, "tension": tension, "planned_tension": planned}
-    return Experiment(
-        table=table2(),
-        robot=controller.robot,
-        **{name: locked(values[:-1].copy()) for name, values in (at_stops | {"correction": correction}).items()},
-        null_error=locked(np.abs(seen[:-1]).max(axis=1)),
-        back=locked(true[-1] - stops[0][0]),
-        time=locked(time[:, 0].copy()),
-        cells=locked(cells.copy()),
-        planned=locked(expected.copy()),
-        lengths=locked(lengths - plans[0].unstrained_length[0]),
-        stops=locked(ends[1:-1].copy()),
-        duration=PERIOD * watch.cycles,
-        winch_speed=max(float(np.abs(rate).max()) for rate in rates if rate is not None),
-        farthest=watch.farthest,
-        misjudged=watch.misjudged,
-        acting=watch.acted / watch.stood,
-        events=controller.events,
-    )
 
 
 def duration() -> float:

@@ -111,21 +111,32 @@ Model: TypeAlias = tuple[Parameter, ...]
 ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # gives actual minus desired positions [m], (K, N, 3)
 
 
-class Explanation(NamedTuple):
-    """Best fit of the errors of k parameters, within plausible limits, to the measured positions."""
+class Explanation:
+    """Best fit of the errors of k parameters, within plausible limits, to the measured positions.
 
-    parameters: Model  # the k parameters
-    values: Array  # errors of the parameters in their units, shape (k,)
-    deviation: Array  # standard deviations of the errors in their units, shape (k,); NaN at a limit
-    at_limit: Flags  # True for errors that are at their plausible limit, shape (k,)
-    predicted: Array  # actual minus desired position with these errors [m], shape (N, 3)
-    rms: float  # root mean square of measured minus predicted position, over all coordinates [m]
-    worst: float  # largest distance of measured and predicted position [m]
-    # Akaike's information criterion, corrected for few measurements. Smaller values are better. A difference of 2 is
-    # not significant.
-    aicc: float
-    # as `rms`, but the prediction of each pose comes from a fit to all other poses [m]
-    left_out: float
+    Attributes:
+        parameters: The k parameters.
+        values: Errors of the parameters in their units, shape (k,).
+        deviation: Standard deviations of the errors in their units, shape (k,); NaN at a limit.
+        at_limit: True for errors that are at their plausible limit, shape (k,).
+        predicted: Actual minus desired position with these errors [m], shape (N, 3).
+        rms: Root mean square of measured minus predicted position, over all coordinates [m].
+        worst: Largest distance of measured and predicted position [m].
+        aicc: Akaike's information criterion, corrected for few measurements. Smaller values are better. A difference of
+            2 is not significant.
+        left_out: As `rms`, but the prediction of each pose comes from a fit to all other poses [m].
+    """
+
+    def __init__(self, model: Model, values: Array, slopes: Array, predicted: Array, measured: Array) -> None:
+        """Evaluate the fitted `values`; `slopes`: derivatives of the positions."""
+        rest = measured - predicted
+        self.parameters, self.values, self.predicted = model, values, predicted
+        self.rms, self.worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
+        low, high = _limits(model)
+        self.at_limit: Flags = (values >= (1.0 - NEAR) * high) | (values <= low + NEAR * high)
+        self.deviation = _deviation(slopes, ~self.at_limit, rest)
+        self.aicc = corrected_aic(self.rms, rest.size, len(model))
+        self.left_out = _left_out(model, values, slopes, rest)
 
     @property
     def names(self) -> frozenset[str]:
@@ -175,7 +186,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
             f"the fit of {names}", f"still moving after {ITERATIONS} steps", "fits that converge", "Omit this model."
         )
     found = error_of([_errors(*of) for of in zip(models, values, strict=True)])
-    return tuple(_explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))
+    return tuple(Explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))
 
 
 def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
@@ -235,16 +246,6 @@ def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple
         for model, slope in zip(models, slopes, strict=True)
     ]
     return values, slopes
-
-
-def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, measured: Array) -> Explanation:
-    rest = measured - predicted
-    rms = float(np.sqrt(np.mean(rest**2)))
-    low, high = _limits(model)
-    at_limit = (values >= (1.0 - NEAR) * high) | (values <= low + NEAR * high)
-    deviation, worst = _deviation(slopes, ~at_limit, rest), float(np.linalg.norm(rest, axis=1).max())
-    aicc, left_out = corrected_aic(rms, rest.size, len(model)), _left_out(model, values, slopes, rest)
-    return Explanation(model, values, deviation, at_limit, predicted, rms, worst, aicc, left_out)
 
 
 def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 import sagline as sl
@@ -23,19 +21,40 @@ SHOWN = 2  # index of the length for which the set psi is drawn separately
 LOW_PART = 50.0  # lowest tension of the curve [N], as in the article
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _FeasibleSets:
-    """Sets psi for some lengths, curve Psi for all lengths, and the line pi that is fitted to the projection of Psi."""
+class FeasibleSets:
+    """Sets psi for some lengths, curve Psi for all lengths, and the line pi that is fitted to the projection of Psi.
 
-    cable: sl.Cable  # material
-    end: End  # desired position B_d of the platform end
-    tolerance: float  # epsilon_max of (20) [m]
-    psi_lengths: Array  # lengths L of the sets psi [m], shape (s,)
-    psi: Array  # outlines of the sets psi in the (T_x, T_z) plane [N], shape (s, points, 2)
-    tensions: Array  # T_x along the curve Psi [N], shape (t,)
-    vertical: Array  # T_z along the curve Psi [N], shape (t,)
-    lengths: Array  # L along the curve Psi [m], shape (t,)
-    line: tuple[Array, Array]  # slope a_pi and intercept b_pi [N] of the line pi through the points (T_x, T_z)
+    Attributes:
+        cable: Material.
+        end: Desired position B_d of the platform end.
+        tolerance: epsilon_max of (20) [m].
+        psi_lengths: Lengths L of the sets psi [m], shape (s,).
+        psi: Outlines of the sets psi in the (T_x, T_z) plane [N], shape (s, points, 2).
+        tensions: T_x along the curve Psi [N], shape (t,).
+        vertical: T_z along the curve Psi [N], shape (t,).
+        lengths: L along the curve Psi [m], shape (t,).
+        line: Slope a_pi and intercept b_pi [N] of the line pi through the points (T_x, T_z).
+    """
+
+    def __init__(
+        self, cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
+    ) -> None:
+        """Exact computation of the article's sets psi at `psi_tensions` [N], and of its curve Psi at `tensions` [N]."""
+        # For a given L, each T gives one B, and each B needs one T. The outline of psi is therefore the set of all T
+        # for which B is on the outline of the tolerance, |dx| + |dz| = epsilon_max around B_d. A search is not
+        # necessary. Source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
+        if points % 4:
+            raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
+        self.cable, self.end, self.tolerance = cable, end, tolerance
+        model, stretch = sl.Catenary(), float(np.hypot(*end)) / end[0]
+        curve = model.from_tension(cable, *end, tensions * stretch, GRAVITY)
+        self.psi_lengths = model.from_tension(cable, *end, psi_tensions * stretch, GRAVITY).unstrained_length
+        outline = np.asarray(end) + tolerance * _diamond(points)
+        around = model.from_length(cable, outline[:, 0], outline[:, 1], self.psi_lengths[:, None], GRAVITY)
+        self.psi = np.stack((around.horizontal_tension, around.vertical_force), axis=-1)
+        self.tensions, self.vertical = curve.horizontal_tension, curve.vertical_force
+        self.lengths = curve.unstrained_length
+        self.line = fit_line(self.tensions, self.vertical)
 
     @property
     def tangent(self) -> float:
@@ -48,25 +67,6 @@ class _FeasibleSets:
         return 0.5 * float(self.cable.linear_density) * GRAVITY * float(np.hypot(*self.end))
 
 
-def feasible_sets(
-    cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
-) -> _FeasibleSets:
-    """Exact computation of the article's sets psi at `psi_tensions` [N], and of its curve Psi at `tensions` [N]."""
-    # For a given L, each T gives one B, and each B needs one T. The outline of psi is therefore the set of all T for
-    # which B is on the outline of the tolerance, |dx| + |dz| = epsilon_max around B_d. A search is not necessary.
-    # Source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
-    if points % 4:
-        raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
-    model, stretch = sl.Catenary(), np.hypot(*end) / end[0]
-    curve = model.from_tension(cable, *end, tensions * stretch, GRAVITY)
-    lengths = model.from_tension(cable, *end, psi_tensions * stretch, GRAVITY).unstrained_length
-    outline = np.asarray(end) + tolerance * _diamond(points)
-    around = model.from_length(cable, outline[:, 0], outline[:, 1], lengths[:, None], GRAVITY)
-    psi = np.stack((around.horizontal_tension, around.vertical_force), axis=-1)
-    found = curve.horizontal_tension, curve.vertical_force, curve.unstrained_length
-    return _FeasibleSets(cable, end, tolerance, lengths, psi, *found, line=fit_line(*found[:2]))
-
-
 def _diamond(points: int) -> Array:
     """Points on |x| + |z| = 1, shape (points + 1, 2); the last point is equal to the first."""
     share = np.linspace(0.0, 4.0, points + 1)
@@ -77,11 +77,11 @@ def _diamond(points: int) -> Array:
 def feasible_chapter() -> Chapter:
     """Chapter about the tensions for which the end of a cable is at a point, exactly or within a tolerance."""
     end = end_at_angle(CHORD)
-    studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
+    studies = [FeasibleSets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     return chapter("feasible-sets", (_psi(studies), _curve(studies[0]), _line(studies[0])), chord=CHORD, angle=ANGLE)
 
 
-def _psi(studies: list[_FeasibleSets]) -> Finding:
+def _psi(studies: list[FeasibleSets]) -> Finding:
     extents = np.array([np.ptp(study.psi[SHOWN, :, 0]) for study in studies])
     length = float(studies[0].psi_lengths[SHOWN])
     figure, ax = axes("$T_x$ [N]", "$T_z$ [N]")
@@ -113,7 +113,7 @@ def _psi(studies: list[_FeasibleSets]) -> Finding:
     )
 
 
-def _curve(study: _FeasibleSets) -> Finding:
+def _curve(study: FeasibleSets) -> Finding:
     figure, ax = axes("$T_x$ [N]", "$d = L - D$ [mm]")
     ax.plot(study.tensions, 1e3 * (study.lengths - CHORD), color=BLUE, linewidth=1.3, label=r"$\Psi$, exact")
     for k, (length, outline) in enumerate(zip(study.psi_lengths, study.psi, strict=True)):
@@ -134,7 +134,7 @@ def _curve(study: _FeasibleSets) -> Finding:
     )
 
 
-def _line(study: _FeasibleSets) -> Finding:
+def _line(study: FeasibleSets) -> Finding:
     slope, intercept = study.line
     rest = study.vertical - (slope * study.tensions + intercept)
     taut = study.tensions >= LOW_PART

@@ -9,7 +9,7 @@ import numpy as np
 from sagline.article import explanations as causes
 from sagline.article.drawing import Drawing, axes, cables_over_time, chapter, error_panels, finding
 from sagline.article.regressions import fit_line
-from sagline.article.ten_poses import TenPoses, ten_poses, tour
+from sagline.article.ten_poses import TenPoses, tour
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION
@@ -20,7 +20,7 @@ AREA = 2e4  # area of a circle that shows an error, per meter of the error [pt^2
 
 def poses_chapter() -> Chapter:
     """Chapter about the ten poses of the prototype, and about possible causes of their errors."""
-    study = ten_poses()
+    study = TenPoses()
     last = [find(study) for find in (_space, _trends, _best_explanations, _limits_of_ten_points)]
     return chapter("poses", [_table(study), _single_causes(study), _tour(), *last])
 

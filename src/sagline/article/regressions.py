@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple, TypeAlias
 
@@ -84,15 +83,25 @@ SHALLOW_K_P = GRAVITY**2 / 24.0
 LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals of lowest and highest tension [N]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class InterceptStudy:
-    """Intercepts b_pi for one end of the cable, and the regressions of the article that lead from b_pi to k_h."""
+    """Intercepts b_pi for one end of the cable, and the regressions of the article that lead from b_pi to k_h.
 
-    sampling: Sampling  # the cables, a angles, c chords, r densities
-    intercept: Array  # intercepts b_pi of the fitted lines [N], shape (a, c, r)
-    h_b: Array  # factor in b_pi = h_b D [N/m], shape (a, r)
-    k_h_of_angle: Array  # factor in h_b = k_h rho, fitted for each angle [m/s^2], shape (a,)
-    k_h: float  # factor in h_b = k_h rho, fitted for all angles together [m/s^2]
+    Attributes:
+        sampling: The cables, a angles, c chords, r densities.
+        intercept: Intercepts b_pi of the fitted lines [N], shape (a, c, r).
+        h_b: Factor in b_pi = h_b D [N/m], shape (a, r).
+        k_h_of_angle: Factor in h_b = k_h rho, fitted for each angle [m/s^2], shape (a,).
+        k_h: Factor in h_b = k_h rho, fitted for all angles together [m/s^2].
+    """
+
+    def __init__(self, sampling: Sampling, vertical: Array) -> None:
+        """Regressions of the vertical forces `vertical` [N] at one end of the cables."""
+        _, intercept = fit_line(sampling.tensions, vertical)
+        self.sampling, self.intercept = sampling, intercept
+        self.h_b = fit_factor(sampling.chords[:, None], intercept, axis=-2)
+        self.k_h_of_angle = fit_factor(sampling.densities, self.h_b)
+        everywhere = np.broadcast_to(sampling.densities, self.h_b.shape)
+        self.k_h = float(fit_factor(everywhere.ravel(), self.h_b.ravel()))
 
     @property
     def bend(self) -> float:
@@ -108,28 +117,29 @@ def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStud
     # 7; erratum 1 in docs/errata.md
     state = sampling.hang()
     frame_end = state.vertical_force - state.cable_weight
-    return _study(sampling, state.vertical_force), _study(sampling, frame_end)
+    return InterceptStudy(sampling, state.vertical_force), InterceptStudy(sampling, frame_end)
 
 
-def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
-    _, intercept = fit_line(sampling.tensions, vertical)
-    h_b = fit_factor(sampling.chords[:, None], intercept, axis=-2)
-    k_h_of_angle = fit_factor(sampling.densities, h_b)
-    everywhere = np.broadcast_to(sampling.densities, h_b.shape)
-    k_h = float(fit_factor(everywhere.ravel(), h_b.ravel()))
-    return InterceptStudy(sampling, intercept, h_b, k_h_of_angle, k_h)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class SagStudy:
-    """Sequence of regressions in the article that leads from the adjusting length d to the constant k_p."""
+    """Regressions (41), (43), (44) and (45) of the article, from the adjusting length d to the constant k_p.
 
-    sampling: Sampling  # the cables, a angles, c chords, r densities, t tensions
-    adjusting_length: Array  # adjusting lengths d [m], shape (a, c, r, t)
-    a_d: Array  # factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r)
-    q_a: Array  # factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r)
-    p_q: Array  # factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,)
-    k_p: float  # factor in p_q = k_p rho^2 (45) [m^2/s^4]
+    Attributes:
+        sampling: The cables, a angles, c chords, r densities, t tensions.
+        adjusting_length: Adjusting lengths d [m], shape (a, c, r, t).
+        a_d: Factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r).
+        q_a: Factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r).
+        p_q: Factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,).
+        k_p: Factor in p_q = k_p rho^2 (45) [m^2/s^4].
+    """
+
+    def __init__(self, sampling: Sampling) -> None:
+        """Fit the factors to sampled cables."""
+        # source: Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15
+        self.sampling, self.adjusting_length = sampling, sampling.hang().adjusting_length
+        self.a_d = fit_factor(sampling.tensions**-2, self.adjusting_length)
+        self.q_a = fit_factor(sampling.chords[:, None] ** 3, self.a_d, axis=-2)
+        self.p_q = fit_factor(np.cos(sampling.angles)[:, None] ** 4, self.q_a, axis=-2)
+        self.k_p = float(fit_factor(sampling.densities**2, self.p_q))
 
     @property
     def fitted_length(self) -> Array:
@@ -164,16 +174,6 @@ def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> tuple[sl.CableS
     return stiff, soft, printed, right
 
 
-def sag_study(sampling: Sampling) -> SagStudy:
-    """Regressions (41), (43), (44) and (45) of the article, in this order."""
-    # source: Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15
-    excess = sampling.hang().adjusting_length
-    a_d = fit_factor(sampling.tensions**-2, excess)
-    q_a = fit_factor(sampling.chords[:, None] ** 3, a_d, axis=-2)
-    p_q = fit_factor(np.cos(sampling.angles)[:, None] ** 4, q_a, axis=-2)
-    return SagStudy(sampling, excess, a_d, q_a, p_q, k_p=float(fit_factor(sampling.densities**2, p_q)))
-
-
 class Constants(NamedTuple):
     """Constants of the empirical model that the regressions give for one range of sampled tensions."""
 
@@ -188,7 +188,7 @@ def constants(sampling: Sampling) -> Constants:
     """Constants k_h and k_p that the regressions of the article give for sampled cables."""
     platform, frame = intercept_studies(sampling)
     tensions = sampling.tensions
-    return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, sag_study(sampling).k_p)
+    return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, SagStudy(sampling).k_p)
 
 
 @cache
@@ -206,7 +206,7 @@ def published_range(sampling: Sampling) -> Constants:
 
     def best_lowest(highest: float) -> float:
         def excess(lowest: float) -> float:
-            return sag_study(sampling.between(lowest, highest)).k_p - PUBLISHED_K_P
+            return SagStudy(sampling.between(lowest, highest)).k_p - PUBLISHED_K_P
 
         return float(brentq(excess, *LOWEST, xtol=1e-6))
 

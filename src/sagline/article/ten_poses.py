@@ -56,24 +56,43 @@ MOST = 3  # largest number of parameters that explain the errors together
 TOUR_SPEED = 0.2  # assumed speed [m/s]; the article states "low speed"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class TenPoses:
-    """The ten poses, their errors, and possible explanations of these errors."""
+    """The ten poses, their errors, and possible explanations of these errors.
 
-    table: Table2
-    plan: sl.Plan  # plan of the prototype for the ten poses, with the empirical model
-    home: sl.Plan  # plan of the prototype for its home pose
-    model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
-    # name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3)
-    trends: dict[str, Array]
-    # all explanations by one parameter, by two and by three parameters; each list is sorted by the remaining error
-    explanations: tuple[tuple[causes.Explanation, ...], ...]
-    # share of a pulley radius's effect that errors of length offset and anchor height together can reproduce (ratio of
-    # vector norms)
-    imitated: float
-    single_zero: Array  # standard deviations of the length offsets of all cables [m], shape (m,)
-    dead_meter: Array  # actual minus desired positions that 1 m of dead length would cause [m], shape (10, 3)
-    measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
+    Attributes:
+        table: Values of the article.
+        plan: Plan of the prototype for the ten poses, with the empirical model.
+        home: Plan of the prototype for its home pose.
+        model_error: Error of the empirical model at the ten poses [m], shape (10, 3).
+        trends: Name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3).
+        explanations: All explanations by one parameter, by two and by three parameters; each list is sorted by the
+            remaining error.
+        imitated: Share of a pulley radius's effect that errors of length offset and anchor height together can
+            reproduce (ratio of vector norms).
+        single_zero: Standard deviations of the length offsets of all cables [m], shape (m,).
+        dead_meter: Actual minus desired positions that 1 m of dead length would cause [m], shape (10, 3).
+        measured_rms: Root mean square of the measured errors, over all coordinates [m].
+    """
+
+    def __init__(self) -> None:
+        """Plan the prototype at the ten poses, and search for possible causes of the measured errors."""
+        # The fits use exact cables and all sets of up to three parameters, within plausible limits. The remaining error
+        # is at least 0.3 mm, because the printed positions are in whole millimeters.
+        table, robot = table2(), sl.load_robot("article-prototype")
+        plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
+
+        def error_of(errors: Sequence[causes.Errors]) -> Array:
+            return causes.rest_positions(robot, plan, home, errors) - table.desired
+
+        self.table, self.plan, self.home = table, plan, home
+        typical = [{one.name: one.typical} for one in causes.PARAMETERS]
+        self.model_error, self.dead_meter, *off = error_of([{}, {causes.DEAD: 1.0}, *typical])
+        self.trends = {parameter.name: error for parameter, error in zip(causes.PARAMETERS, off, strict=True)}
+        models = causes.subsets(causes.PARAMETERS, MOST)
+        found = sorted(causes.explanations(error_of, table.error, models), key=lambda one: one.rms)
+        self.explanations = [[one for one in found if len(one.parameters) == count + 1] for count in range(MOST)]
+        self.imitated, self.single_zero = _limits(robot, error_of, plan, self.best(2))
+        self.measured_rms = float(np.sqrt(np.mean(table.error**2)))
 
     def height_slope(self, error: Array) -> float:
         """Slope [mm/m] of a line that is fitted to the vertical `error` (10, 3) [m] over the height of the poses."""
@@ -86,33 +105,6 @@ class TenPoses:
     def explanation(self, *names: str) -> causes.Explanation:
         """Explanation by the parameters that are named `names`."""
         return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
-
-
-def ten_poses() -> TenPoses:
-    """Plan the prototype at the ten poses, and search for possible causes of the measured errors."""
-    # The fits use exact cables and all sets of up to three parameters, within plausible limits. The remaining error is
-    # at least 0.3 mm, because the printed positions are in whole millimeters.
-    table, robot = table2(), sl.load_robot("article-prototype")
-    plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
-
-    def error_of(errors: Sequence[causes.Errors]) -> Array:
-        return causes.rest_positions(robot, plan, home, errors) - table.desired
-
-    nominal, dead, *off = error_of([{}, {causes.DEAD: 1.0}, *({one.name: one.typical} for one in causes.PARAMETERS)])
-    found = sorted(
-        causes.explanations(error_of, table.error, causes.subsets(causes.PARAMETERS, MOST)), key=lambda one: one.rms
-    )
-    ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(MOST))
-    imitated, single_zero = _limits(robot, error_of, plan, ranked[1][0])
-    return TenPoses(
-        *(table, plan, home, nominal),
-        trends={parameter.name: error for parameter, error in zip(causes.PARAMETERS, off, strict=True)},
-        explanations=ranked,
-        imitated=imitated,
-        single_zero=single_zero,
-        dead_meter=dead,
-        measured_rms=float(np.sqrt(np.mean(table.error**2))),
-    )
 
 
 def tour(rate: float = 10.0) -> tuple[sl.Plan, Array]:

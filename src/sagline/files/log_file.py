@@ -121,7 +121,7 @@ def _read(path: Path, rows: Iterator[CsvRow]) -> tuple[CsvTable, int]:
     commanded = {f"{name}{COMMANDED}": optional_units[name] for name in _POSE_COLUMNS}
     units = {"time": "s", **readings, **optional_units, **commanded}
     whole = chain((header,), rows) if names else rows
-    table = CsvTable.read(path, whole, units, gaps=frozenset((*readings, *optional_units)))
+    table = CsvTable(path, whole, units, gaps=frozenset((*readings, *optional_units)))
     kinds = [kind for kind in ("count", "length") if table.columns.keys() & set(tables.names_of_cables(kind, cables))]
     if len(kinds) != 1:
         what = "columns of counts and of lengths" if kinds else "neither columns count_0, ... nor length_0, ..."

@@ -38,7 +38,7 @@ PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
 def _path_from_table(path: FilePath, text: str) -> Path:
-    table = CsvTable.read(path, csv_rows(path, text), UNITS)
+    table = CsvTable(path, csv_rows(path, text), UNITS)
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
     late = np.diff(time, prepend=-np.inf) < _LEAST_STEP

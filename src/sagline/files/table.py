@@ -9,7 +9,6 @@ import os
 import re
 from array import array
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NamedTuple, TypeAlias, cast
@@ -37,31 +36,32 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?\s*")
 CsvRow: TypeAlias = tuple[int, list[str]]  # line number in the file, from 1, and cells
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class CsvTable:
-    """Table with columns of numbers in SI."""
+    """Table with columns of numbers in SI.
 
-    path: Path  # the file, for messages
-    columns: dict[str, Array]  # name and numbers of each column, shape (rows,)
-    lines: array[int]  # line number of each row in the file, from 1
-    header: int  # line number of the header
-    plain: frozenset[str]  # names of columns without a unit in the header; the values are in SI
+    Attributes:
+        path: The file, for messages.
+        columns: Name and numbers of each column, shape (rows,).
+        lines: Line number of each row in the file, from 1.
+        header: Line number of the header.
+        plain: Names of columns without a unit in the header; the values are in SI.
+    """
 
-    @classmethod
-    def read(
-        cls,
+    def __init__(
+        self,
         path: Path,
         rows: Iterable[CsvRow],
         units: Mapping[str, str],
         strangers: Mapping[str, str] = _NONE,
         gaps: Collection[str] = (),
-    ) -> CsvTable:
+    ) -> None:
         """Read the rows of a table; the first row contains the names of the columns, `name` or `name [unit]`."""
         found: dict[str, float | None] = {}
-        numbers, lines, header = array("d"), array("q"), 0
+        numbers, lines = array("d"), array("q")
+        self.path, self.lines, self.header = path, lines, 0
         for line, row in rows:
             if not found:
-                found, header = _factors(path, line, row, units, strangers), line
+                found, self.header = _factors(path, line, row, units, strangers), line
             else:
                 numbers.extend(_numbers(path, line, row, tuple(found), gaps))
                 lines.append(line)
@@ -71,14 +71,14 @@ class CsvTable:
         values = np.array(numbers).reshape(len(lines), len(found))
         factors = [1.0 if factor is None else factor for factor in found.values()]
         with np.errstate(over="ignore"):  # a later check reports values that are too large
-            columns = {name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))}
-        plain = frozenset(name for name, factor in found.items() if factor is None)
-        table = cls(path, columns, lines, header, plain)
-        for name, column in columns.items():
+            self.columns = {
+                name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))
+            }
+        self.plain = frozenset(name for name, factor in found.items() if factor is None)
+        for name, column in self.columns.items():
             wrong = np.isinf(column) if name in gaps else ~np.isfinite(column)
-            table.refuse(wrong, name, column, units[name], "a finite number")
-            table.refuse(np.abs(column) > LARGEST, name, column, units[name], f"{REACH} {units[name]}".rstrip())
-        return table
+            self.refuse(wrong, name, column, units[name], "a finite number")
+            self.refuse(np.abs(column) > LARGEST, name, column, units[name], f"{REACH} {units[name]}".rstrip())
 
     def check_columns(self, names: Iterable[str], hint: str) -> None:
         """Refuse a table in which one of the columns `names` is missing. `hint`: end of the message."""
@@ -222,7 +222,7 @@ def load_readings(
     other, hint = _OTHERS[kind]
     units = {"time": "s", **dict.fromkeys(names, "m" if kind == "length" else "")}
     strangers = dict.fromkeys(names_of_cables(other, cable_count), hint)
-    table = CsvTable.read(path, csv_rows(path, read_text(path, TABLE_LIMIT)), units, strangers)
+    table = CsvTable(path, csv_rows(path, read_text(path, TABLE_LIMIT)), units, strangers)
     table.check_columns(names, f"; the robot has {cable_count} cables")
     table.check_rows()
     for name in names if kind == "length" else ():
@@ -268,7 +268,7 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
         >>> sl.load_measurements("cable.csv")  # doctest: +SKIP
     """
     path = file_path(file)
-    table = CsvTable.read(path, csv_rows(path, read_text(path, TABLE_LIMIT)), UNITS)
+    table = CsvTable(path, csv_rows(path, read_text(path, TABLE_LIMIT)), UNITS)
     table.check_columns(UNITS, f"; found: {', '.join(table.columns)}")
     for name, unit in UNITS.items():
         if name != "rise":

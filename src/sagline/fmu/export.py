@@ -18,7 +18,7 @@ from sagline.core.arguments import choice, instance, whole_number
 from sagline.core.arrays import leaves, owner
 from sagline.core.version import __version__
 from sagline.dynamics.simulation.simulate import Integrator
-from sagline.dynamics.simulation.simulator import KernelArguments, Simulator
+from sagline.dynamics.simulation.simulator import Simulator
 from sagline.dynamics.simulation.winches import Winches
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.files.c_source import checked_name, constant_text, filled, origin, reached_parts, translated_kernels
@@ -134,14 +134,13 @@ class _Image:
 
     def __init__(self, machine: Simulator, inputs: Inputs) -> None:
         """Join the arrays of `machine`."""
-        given: KernelArguments = machine.kernel_arguments
+        period, massless, self._look = self.given = machine.kernel_arguments
         self._places: dict[int, int] = {}
         self.numbers: list[float] = []
         self.counters: list[int] = []
-        self.given = given
-        self.step: float = given.run_massless[2][0]
-        (asked, _, wrench), lengths, load = given.begin_period[0], given.begin_period[3], given.begin_period[5]
-        for array in (each for each in leaves(given) if isinstance(each, np.ndarray)):
+        self.step: float = massless[2][0]
+        (asked, _, wrench), lengths, load = period[0], period[3], period[5]
+        for array in (each for each in leaves(self.given) if isinstance(each, np.ndarray)):
             whole = owner(array)
             if id(whole) not in self._places:
                 target: list[Any] = self.counters if whole.dtype == np.int64 else self.numbers
@@ -168,7 +167,7 @@ class _Image:
         """Inputs, outputs and time, in the order of their value references."""
         kind, unit = ("speed", "m/s") if inputs == "speeds" else ("length", "m")
         found = [_Variable(f"winch_{kind}_{i}", unit, "input", self.set_points + i) for i in range(m)]
-        platform = self.place(self.given.platform_state[-1])
+        platform = self.place(self._look[-1])
         vectors = (
             ("force", "xyz", "N", "input", wrench),
             ("moment", "xyz", "N.m", "input", wrench + 3),

@@ -15,7 +15,7 @@ from sagline.core.arrays import Array, Indices, blocks, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Columns, Result, Tabular
 from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere, extent_text
-from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, rod_row, rows_of_parts
+from sagline.interference.pairs import Obstacle, Pairs, box_rows, cable_rows, rod_row, rows_of_parts
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
 from sagline.robot.batch import Robots, first_of
@@ -49,7 +49,7 @@ class ClearanceRows:
         self._radius = cable_radius
         self._from_anchor = 0.0 if from_anchor is None else from_anchor
         self._platform = _platform_of(robot) if platform is None else platform
-        self.pairs = pairs_of(robot, obstacles, self._platform, from_anchor=from_anchor is not None)
+        self.pairs = Pairs(robot, obstacles, self._platform, from_anchor=from_anchor is not None)
         still = [rod_row(one) if isinstance(one, Capsule | Sphere) else _box_row(one) for one in obstacles]
         self._still = locked(np.array(still).reshape(-1, shapes.COLUMNS))
         self._meshed = None

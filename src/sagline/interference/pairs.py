@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.core.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, locked
 from sagline.core.errors import SaglineError
 from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere
 from sagline.kernels.codes import CATENARY
@@ -116,61 +116,65 @@ _SAME = 1e-9  # anchors count as one anchor if their distance, relative to the r
 _NO_LENGTH = "cables and platform: give from_anchor, the length of cable at the anchor that is not measured"
 
 
-class Pairs(NamedTuple):
-    """Pairs of numbered bodies: first all parts of cables, then the platform (even without shape), then obstacles."""
-
-    parts: tuple[_CablePart, ...]  # parts of cables that occur in pairs
-    by_kernel: Indices  # numbers of the pairs that kernels measure, shape (P, 2)
-    with_mesh: Indices  # numbers of the pairs with at least one mesh, shape (Q, 2)
-    names: tuple[tuple[str, str], ...]  # names of all pairs, in the order of their numbers
-    left_out: tuple[str, ...]  # pairs that are not measured, with the reasons
-
-
 Body = _CablePart | int  # part of a cable, -1 for the platform, or number of an obstacle
 
 
-def pairs_of(
-    robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
-) -> Pairs:
-    """All pairs of bodies of a robot and obstacles. Without `from_anchor`, pairs with a common anchor are omitted."""
-    at_frame, at_platform = (_together(anchors) for anchors in robot_fields(robot, "frame_anchors", "platform_anchors"))
-    cables = range(len(at_frame))
-    found: list[tuple[Body, Body]] = []  # part of a cable, -1 for the platform, or number of an obstacle
-    left_out: list[str] = []
-    for i, j in combinations(cables, 2):
-        shared = bool(at_frame[i, j]), bool(at_platform[i, j])
-        if all(shared) or (any(shared) and not from_anchor):
-            where = " and ".join(name for name, there in zip(("frame", PLATFORM), shared, strict=True) if there)
-            left_out.append(f"cable {i} and cable {j}: they share their anchor on the {where}")
-        else:
-            found.append((_CablePart(i, *shared), _CablePart(j, *shared)))
-    found += [(_CablePart(i, off_frame=from_anchor), k) for k in range(len(obstacles)) for i in cables]
-    if platform is not None:
-        found += [(-1, k) for k in range(len(obstacles))]
-        found += [(_CablePart(i, off_platform=True), -1) for i in cables if from_anchor]
-        left_out += [] if from_anchor else [_NO_LENGTH]
-    parts = tuple(dict.fromkeys(one for pair in found for one in pair if isinstance(one, _CablePart)))
-    forms = (platform, *obstacles)
-    own = _names(obstacles)
+class Pairs:
+    """Pairs of numbered bodies: first all parts of cables, then the platform (even without shape), then obstacles.
 
-    def number(one: Body) -> int:
-        return parts.index(one) if isinstance(one, _CablePart) else len(parts) + 1 + one
+    Attributes:
+        parts: Parts of cables that occur in pairs.
+        by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
+        with_mesh: Numbers of the pairs with at least one mesh, shape (Q, 2).
+        names: Names of all pairs, in the order of their numbers.
+        left_out: Pairs that are not measured, with the reasons.
+    """
 
-    def name(one: Body) -> str:
-        return f"cable {one.cable}" if isinstance(one, _CablePart) else PLATFORM if one < 0 else own[one]
+    def __init__(
+        self, robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
+    ) -> None:
+        """Pair all bodies of a robot and obstacles. Without `from_anchor`, omit pairs with a common anchor."""
+        at_frame, at_platform = (
+            _together(anchors) for anchors in robot_fields(robot, "frame_anchors", "platform_anchors")
+        )
+        cables = range(len(at_frame))
+        found: list[tuple[Body, Body]] = []  # part of a cable, -1 for the platform, or number of an obstacle
+        left_out: list[str] = []
+        for i, j in combinations(cables, 2):
+            shared = bool(at_frame[i, j]), bool(at_platform[i, j])
+            if all(shared) or (any(shared) and not from_anchor):
+                where = " and ".join(name for name, there in zip(("frame", PLATFORM), shared, strict=True) if there)
+                left_out.append(f"cable {i} and cable {j}: they share their anchor on the {where}")
+            else:
+                found.append((_CablePart(i, *shared), _CablePart(j, *shared)))
+        found += [(_CablePart(i, off_frame=from_anchor), k) for k in range(len(obstacles)) for i in cables]
+        if platform is not None:
+            found += [(-1, k) for k in range(len(obstacles))]
+            found += [(_CablePart(i, off_platform=True), -1) for i in cables if from_anchor]
+            left_out += [] if from_anchor else [_NO_LENGTH]
+        parts = tuple(dict.fromkeys(one for pair in found for one in pair if isinstance(one, _CablePart)))
+        forms = (platform, *obstacles)
+        own = _names(obstacles)
 
-    def form(one: Body) -> object:
-        return one if isinstance(one, _CablePart) else forms[1 + one]
+        def number(one: Body) -> int:
+            return parts.index(one) if isinstance(one, _CablePart) else len(parts) + 1 + one
 
-    def in_order(pair: tuple[Body, Body]) -> tuple[Body, Body]:
-        boxes = [isinstance(form(one), Box) for one in pair]
-        return pair[::-1] if boxes == [True, False] else pair  # in kernels, a box is the second body of a pair
+        def name(one: Body) -> str:
+            return f"cable {one.cable}" if isinstance(one, _CablePart) else PLATFORM if one < 0 else own[one]
 
-    other = [pair for pair in found if any(isinstance(form(one), Mesh) for one in pair)]
-    plain = [in_order(pair) for pair in found if pair not in other]
-    numbers = (np.array([[number(a), number(b)] for a, b in some], dtype=np.int64) for some in (plain, other))
-    by_kernel, with_mesh = (locked(array.reshape(-1, 2)) for array in numbers)
-    return Pairs(parts, by_kernel, with_mesh, tuple((name(a), name(b)) for a, b in plain + other), tuple(left_out))
+        def form(one: Body) -> object:
+            return one if isinstance(one, _CablePart) else forms[1 + one]
+
+        def in_order(pair: tuple[Body, Body]) -> tuple[Body, Body]:
+            boxes = [isinstance(form(one), Box) for one in pair]
+            return pair[::-1] if boxes == [True, False] else pair  # in kernels, a box is the second body of a pair
+
+        other = [pair for pair in found if any(isinstance(form(one), Mesh) for one in pair)]
+        plain = [in_order(pair) for pair in found if pair not in other]
+        numbers = (np.array([[number(a), number(b)] for a, b in some], dtype=np.int64) for some in (plain, other))
+        self.by_kernel, self.with_mesh = (locked(array.reshape(-1, 2)) for array in numbers)
+        self.names = tuple((name(a), name(b)) for a, b in plain + other)
+        self.parts, self.left_out = parts, tuple(left_out)
 
 
 def _together(anchors: Array) -> NDArray[np.bool_]:
@@ -198,14 +202,32 @@ _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
 _FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
 
 
-class _Solid(NamedTuple):
-    """A body for fcl."""
+class _Solid:
+    """A body for fcl.
 
-    geometry: Any  # geometry of the body
-    radius: float  # radius of a rod or ball, which is subtracted from distances [m]
-    mesh: Mesh | None  # triangles of the body; None for rods and balls
-    inner: Array  # point inside the body [m]
-    place: tuple[Array, Array]  # rotation and position of a body at rest
+    Attributes:
+        geometry: Geometry of the body.
+        radius: Radius of a rod or ball, which is subtracted from distances [m].
+        mesh: Triangles of the body; None for rods and balls.
+        inner: Point inside the body [m].
+        place: Rotation and position of a body at rest.
+    """
+
+    def __init__(self, fcl: ModuleType, form: Obstacle | None) -> None:
+        self.radius, self.mesh, self.place = 0.0, None, (np.eye(3), np.zeros(3))
+        if isinstance(form, Box):
+            form = Mesh(_SIGNS * form.size @ form.orientation.T + form.center, _FACES, form.name)
+        if isinstance(form, Mesh):
+            self.geometry, self.mesh, self.inner = fcl.BVHModel(), form, form.vertices[form.faces[0, 0]]
+            self.geometry.beginModel(len(form.vertices), len(form.faces))
+            self.geometry.addSubModel(np.array(form.vertices), np.array(form.faces))
+            self.geometry.endModel()
+            return
+        assert isinstance(form, Capsule | Sphere)
+        ends = (form.start, form.end) if isinstance(form, Capsule) else (form.center, form.center)
+        self.radius, self.inner = form.radius, ends[0]
+        self.place, length = _along(*ends)
+        self.geometry = fcl.Capsule(0.0, length)
 
 
 _Nearest = tuple[float, float, Array, Array]
@@ -220,7 +242,7 @@ class Meshed:
         self._fcl = package()
         self._pairs, self._precision, self._parts = pairs, precision, len(pairs.parts)
         taking_part = {int(number) for number in pairs.with_mesh.ravel() if number >= self._parts}
-        self._solids = {number: self._solid(forms[number - self._parts]) for number in sorted(taking_part)}
+        self._solids = {number: _Solid(self._fcl, forms[number - self._parts]) for number in sorted(taking_part)}
         self._known: dict[tuple[int, bytes], bool] = {}
 
     def measure(self, pose: Pose, moving: Array, least: Array | None, out: tuple[Array, Array, Array]) -> None:
@@ -240,22 +262,6 @@ class Meshed:
                 nearest[n, q] = found[2:]
                 if least is not None:
                     enough = min(enough, found[0])
-
-    def _solid(self, form: Obstacle | None) -> _Solid:
-        still = np.eye(3), np.zeros(3)
-        if isinstance(form, Box):
-            form = Mesh(_SIGNS * form.size @ form.orientation.T + form.center, _FACES, form.name)
-        if isinstance(form, Mesh):
-            model = self._fcl.BVHModel()
-            model.beginModel(len(form.vertices), len(form.faces))
-            model.addSubModel(np.array(form.vertices), np.array(form.faces))
-            model.endModel()
-            return _Solid(model, 0.0, form, form.vertices[form.faces[0, 0]], still)
-        if isinstance(form, Capsule):
-            place, length = _along(form.start, form.end)
-            return _Solid(self._fcl.Capsule(0.0, length), form.radius, None, form.start, place)
-        assert isinstance(form, Sphere)
-        return _Solid(self._fcl.Capsule(0.0, 0.0), form.radius, None, form.center, (np.eye(3), form.center))
 
     def _object(self, number: int, at: dict[int, tuple[Array, Array]]) -> Any:
         solid = self._solids[number]

@@ -134,14 +134,27 @@ class Samples(NamedTuple):
     rests: Array  # times of rest since the previous block [s], and the first time, 0 s
 
 
-class _Timed(NamedTuple):
-    """Moves with their times. Each move accelerates, keeps its speed, and decelerates."""
+class _Timed:
+    """Moves with their times. Each move accelerates, keeps its speed, and decelerates.
 
-    moves: Moves
-    enter: Array  # speed at the start [m/s], shape (M,)
-    cruise: Array  # largest speed [m/s], shape (M,)
-    leave: Array  # speed at the end [m/s], shape (M,)
-    duration: Array  # [s], shape (M,)
+    Attributes:
+        moves: The moves.
+        enter: Speed at the start [m/s], shape (M,).
+        cruise: Largest speed [m/s], shape (M,).
+        leave: Speed at the end [m/s], shape (M,).
+        duration: Duration [s], shape (M,).
+    """
+
+    def __init__(self, moves: Moves, squares: Array, acceleration: float) -> None:
+        """Compute the times from the squared speeds (M + 1,) at the ends of the moves."""
+        before, after = squares[:-1], squares[1:]
+        top = np.minimum(_limit(moves, acceleration), 0.5 * (before + after) + acceleration * moves.length)
+        top = np.maximum(np.maximum(top, before), after)
+        enter, cruise, leave = np.sqrt(before), np.sqrt(top), np.sqrt(after)
+        even = np.maximum(moves.length - (2.0 * top - before - after) / (2.0 * acceleration), 0.0)
+        steady = np.divide(even, cruise, out=np.zeros_like(even), where=cruise > 0.0)
+        self.moves, self.enter, self.cruise, self.leave = moves, enter, cruise, leave
+        self.duration = (2.0 * cruise - enter - leave) / acceleration + steady + moves.dwell
 
 
 def samples_along(blocks: Iterable[Moves], acceleration: float, rate: float, most: float) -> Iterator[Samples]:
@@ -235,10 +248,10 @@ def _timed(blocks: Iterable[Moves], acceleration: float) -> Iterator[tuple[_Time
         slowest, fastest = (_squares(chain, acceleration, entry, end) for end in (0.0, float(chain.speed[-1] ** 2)))
         known = int(np.flatnonzero(slowest[:-1] == fastest[:-1])[-1])
         if known > 0:
-            yield _with_times(chain[:known], slowest[: known + 1], acceleration), False
+            yield _Timed(chain[:known], slowest[: known + 1], acceleration), False
         held, entry = chain[known:], float(slowest[known])
     if held is not None and len(held):
-        yield _with_times(held, _squares(held, acceleration, entry, 0.0), acceleration), True
+        yield _Timed(held, _squares(held, acceleration, entry, 0.0), acceleration), True
 
 
 def _limit(moves: Moves, acceleration: float) -> Array:
@@ -264,17 +277,6 @@ def _squares(chain: Moves, acceleration: float, entry: float, end: float) -> Arr
     squares: Array = np.clip(up, 0.0, bounds)
     squares[0] = entry
     return squares
-
-
-def _with_times(moves: Moves, squares: Array, acceleration: float) -> _Timed:
-    """Largest speeds and durations of moves from the squares of the speeds (M + 1,) at their ends."""
-    before, after = squares[:-1], squares[1:]
-    top = np.minimum(_limit(moves, acceleration), 0.5 * (before + after) + acceleration * moves.length)
-    top = np.maximum(np.maximum(top, before), after)
-    enter, cruise, leave = np.sqrt(before), np.sqrt(top), np.sqrt(after)
-    even = np.maximum(moves.length - (2.0 * top - before - after) / (2.0 * acceleration), 0.0)
-    steady = np.divide(even, cruise, out=np.zeros_like(even), where=cruise > 0.0)
-    return _Timed(moves, enter, cruise, leave, (2.0 * cruise - enter - leave) / acceleration + steady + moves.dwell)
 
 
 def _sampled(timed: _Timed, clock: Array, ends: Array, acceleration: float, rests: Array) -> Samples:

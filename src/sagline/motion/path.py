@@ -136,7 +136,7 @@ def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
         allowed = "as many poses as times, at least two"
         raise InvalidValueError("pose", value, allowed, "Give one pose for each time.")
     velocity, acceleration = spline_rates(clock, pose.position)
-    angular_velocity, angular_acceleration = _angular_rates(clock, _without_sign_changes(pose.quaternion))
+    angular_velocity, angular_acceleration = _angular_rates(clock, without_sign_changes(pose.quaternion))
     twist = np.hstack((velocity, angular_velocity))
     return Path(clock, pose, twist, np.hstack((acceleration, angular_acceleration)))
 
@@ -149,7 +149,7 @@ def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
     return spline(time, 1), spline(time, 2)
 
 
-def _without_sign_changes(quaternion: Array) -> Array:
+def without_sign_changes(quaternion: Array) -> Array:
     """Quaternions without sign changes between consecutive samples; q and -q are the same rotation."""
     aligned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) >= 0.0
     sign = np.cumprod(np.concatenate(([1.0], np.where(aligned, 1.0, -1.0))))
@@ -164,12 +164,12 @@ def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
     # RotationSpline of scipy is not used, because its accelerations at both ends are wrong, even with small steps: its
     # first and last velocities are means over the outermost steps.
     rate, curvature = spline_rates(time, quaternion)
-    velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
+    velocity = 2.0 * conjugate_product(rate, quaternion)
     growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of |q|, which is not constant along a spline
-    return velocity, 2.0 * _vector_of_product_with_conjugate(curvature, quaternion) - 2.0 * growth * velocity
+    return velocity, 2.0 * conjugate_product(curvature, quaternion) - 2.0 * growth * velocity
 
 
-def _vector_of_product_with_conjugate(a: Array, b: Array) -> Array:
+def conjugate_product(a: Array, b: Array) -> Array:
     """Vector part (N, 3) of the quaternion products a b*; quaternions (N, 4) with the scalar last."""
     vector: Array = b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])
     return vector

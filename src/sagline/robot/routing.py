@@ -11,8 +11,9 @@ without friction, T + T^2/(2 EA) - w z is constant, which gives the tension at t
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.models import Catenary, Elastic
 from sagline.core.arrays import LARGEST, Array, Flags, Indices, locked
 from sagline.kernels import codes
-from sagline.robot.batch import refuse_slanted, winches_of
+from sagline.robot.batch import outward, refuse_slanted, winches_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -41,19 +42,35 @@ _TINY: Final = 1e-300
 _Routing: TypeAlias = tuple[Array, Array, Array]
 
 
-class _ExitState(NamedTuple):
-    """State of K cables at their exit points, arrays of shape (K,)."""
+class _ExitState:
+    """Cables at their exit points P, fields of shape (K,).
 
-    tension: Array  # T_A at the exit point P [N]
-    weight: Array  # w [N/m]; 0 for a cable model without weight between P and the drum
-    stiffness: Array  # EA [N]
-    wrap: Array  # psi [rad]
-    sine: Array  # sin psi
-    tangent: Array  # unit tangent at P, toward the platform, shape (K, 3)
-    radius: Array  # R [m]
-    entry: Array  # +1 for a cable that enters its pulley from below, -1 from above
-    friction: Array  # mu; negative while paying out, 0 at rest
-    rolling: Array  # 1 + f while winding in, 1 - f while paying out, 1 at rest
+    Attributes:
+        tension: T_A at the exit point P [N].
+        weight: w [N/m]; 0 for a cable model without weight between P and the drum.
+        stiffness: EA [N].
+        wrap: psi [rad].
+        sine: sin psi.
+        tangent: Unit tangent at P, toward the platform, shape (K, 3).
+        radius: R [m].
+        entry: +1 for a cable that enters its pulley from below, -1 from above.
+        friction: mu; negative while paying out, 0 at rest.
+        rolling: 1 + f while winding in, 1 - f while paying out, 1 at rest.
+    """
+
+    def __init__(self, state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cable: Indices) -> None:
+        contact = state.contact
+        assert contact is not None
+        material, exact = robot.cables, state.cables.model.code == codes.CATENARY
+        self.tension, self.stiffness = _exit_tension(state)[known], material.axial_stiffness[cable]
+        self.weight = material.linear_density[cable] * robot.gravity * exact
+        self.wrap, self.entry = contact.wrap_angle[known], winches.swivel_axis[cable, 2]
+        self.sine, self.radius = np.sin(self.wrap), winches.pulley_radius[cable]
+        across = self.sine[:, None] * outward(robot, state.pose)[known]
+        self.tangent = np.concatenate((across, (self.entry * np.cos(self.wrap))[:, None]), axis=-1)
+        sign = np.zeros(self.wrap.shape) if contact.winding is None else contact.winding[known]
+        self.friction = sign * winches.pulley_friction[cable]
+        self.rolling = 1.0 + sign * winches.rolling_friction[cable]
 
     def entering(self, bend: Array) -> Array:
         """Tension [N] on the drum side of the pulley, if the cable has an additional bend [rad] at the frame anchor."""
@@ -119,7 +136,7 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
     if not known.any():
         return found
     cable = np.broadcast_to(np.arange(shape[-1]), shape)[known]
-    leaving = _exit_state(state, robot, winches, known, cable)
+    leaving = _ExitState(state, robot, winches, known, cable)
     if guided or winches.guides is None:
         part = _straight_run(leaving, winches.dead_cable[cable], winches.dead_rise[cable])
     else:
@@ -139,7 +156,7 @@ def guide_forces(state: Equilibrium) -> Array:
     known = np.isfinite(_exit_tension(state))
     cable = np.broadcast_to(np.arange(known.shape[-1]), known.shape)[known]
     found = np.full((*known.shape, winches.guides.shape[1] + 1, 3), np.nan)
-    leaving = _exit_state(state, robot, winches, known, cable)
+    leaving = _ExitState(state, robot, winches, known, cable)
     found[known] = _guided_spans(leaving, winches, robot, state.cables.model, cable)[2]
     return found
 
@@ -148,33 +165,6 @@ def _exit_tension(state: Equilibrium) -> Array:
     """Tensions [N] at the exit points P: frame-end tensions in the exact model, chord tensions in all other models."""
     cables = state.cables
     return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
-
-
-def _exit_state(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cable: Indices) -> _ExitState:
-    cables, contact = state.cables, state.contact
-    assert contact is not None
-    material = robot.cables
-    weight = np.zeros(cables.shape[-1])
-    if cables.model.code == codes.CATENARY:
-        weight = material.linear_density * robot.gravity
-    ends = state.pose.position[..., None, :] + robot.platform_anchors @ np.swapaxes(state.pose.matrix, -1, -2)
-    level = (ends - robot.frame_anchors)[..., :2][known]
-    outward = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), _TINY)
-    wrap, entry = contact.wrap_angle[known], winches.swivel_axis[cable, 2]
-    sine = np.sin(wrap)
-    sign = np.zeros(wrap.shape) if contact.winding is None else contact.winding[known]
-    return _ExitState(
-        _exit_tension(state)[known],
-        weight[cable],
-        material.axial_stiffness[cable],
-        wrap,
-        sine,
-        np.concatenate((sine[:, None] * outward, (entry * np.cos(wrap))[:, None]), axis=-1),
-        winches.pulley_radius[cable],
-        entry,
-        sign * winches.pulley_friction[cable],
-        1.0 + sign * winches.rolling_friction[cable],
-    )
 
 
 def tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
@@ -221,7 +211,8 @@ def _guided_spans(
     # An eyelet at the frame anchor bends the cable between the direction of the last span and the exit direction. At a
     # pulley, the span meets the direction of the swivel axis.
     onward = np.where(eyelet[:, None], at.tangent, axis)
-    at = at._replace(wrap=np.where(eyelet, 0.0, at.wrap))
+    at = copy(at)
+    at.wrap = np.where(eyelet, 0.0, at.wrap)
     steps = points[:, :-1] - points[:, 1:]
     along = steps / np.linalg.norm(steps, axis=-1, keepdims=True)
     bends = [_angle(along[:, j], along[:, j - 1] if j else onward) for j in range(steps.shape[1])]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sagline.core.arrays import Array
@@ -20,13 +18,17 @@ NEUTRAL = 1e-12  # a stiffness below this share of the largest stiffness counts 
 LONGEST_STEP = 0.2
 
 
-class _LumpedCables(NamedTuple):
+class _LumpedCables:
     """Cables divided into elements."""
 
-    element: Array  # unstrained length of the elements [m], shape (m,)
-    weight: Array  # weight per length [N/m], shape (m,)
-    stiffness: Array  # EA [N], shape (m,)
-    nodes: int  # elements per cable
+    def __init__(self, state: Equilibrium, nodes: int) -> None:
+        """Divide the cables of a state into `nodes` elements each."""
+        material = state.cables.cable
+        # element: unstrained length of the elements [m], shape (m,)
+        # weight: weight per length [N/m], shape (m,)
+        # stiffness: EA [N], shape (m,)
+        self.element, self.nodes = state.free_length / nodes, nodes
+        self.weight, self.stiffness = material.linear_density * state.one_robot.gravity, material.axial_stiffness
 
     def elements(self, force: Array) -> tuple[Array, Array]:
         """Forces at the centers of the elements, platform end first, and their magnitudes."""
@@ -59,8 +61,7 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> tuple[Pose, Array, Array]:
     # therefore follows from the midpoint rule, and pose and forces have errors of the order nodes^-2. The wrench is
     # balanced to rounding. Source: docs/model.md, section 11
     robot, exits = state.one_robot, state.exit_point
-    length, material = state.free_length, state.cables.cable
-    chains = _LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
+    chains = _LumpedCables(state, nodes)
     center, freedom = robot.center_of_mass, robot.freedom
     given = state.wrench - np.array([0.0, 0.0, robot.mass * robot.gravity, 0.0, 0.0, 0.0])
     force = platform_end_forces(state)
@@ -75,7 +76,7 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> tuple[Pose, Array, Array]:
         pose = displaced_pose(pose, robot, motion)
         if near:
             break
-        near = bool(np.abs(motion).max() <= NEAR * length.max())
+        near = bool(np.abs(motion).max() <= NEAR * state.free_length.max())
     else:
         raise _no_rest("start", "an equilibrium, near which its chains have none")
     ends = pose.position + robot.platform_anchors @ pose.matrix.T

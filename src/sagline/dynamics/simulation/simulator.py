@@ -62,14 +62,6 @@ class Reading(NamedTuple):
     saturated: Array
 
 
-class KernelArguments(NamedTuple):
-    """Arguments of the three kernels of a period, in the order of their calls."""
-
-    begin_period: tuple[Any, ...]
-    run_massless: tuple[Any, ...]
-    platform_state: tuple[Any, ...]
-
-
 class Simulator:
     """Simulated machine for the test of a controller: winches, cables without mass, platform and sensors.
 
@@ -149,7 +141,8 @@ class Simulator:
         run = (*plant.arguments(*self._settings), self._records, 0, 0)
         frame = (locked(plant.robot.center_of_mass @ plant.axes), plant.turn_back)
         look = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
-        self.kernel_arguments: KernelArguments = KernelArguments(self._period, run, look)
+        # arguments of the three kernels of a period, in the order of their calls
+        self.kernel_arguments: tuple[tuple[Any, ...], ...] = self._period, run, look
         self._run = bound(motion.run_massless, *run, numbers=2)
         self._look = bound(body.platform_state, *look)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
-from sagline.motion.path import Path
+from sagline.motion.path import Path, conjugate_product, without_sign_changes
 from sagline.motion.rest_to_rest import QUINTIC, Segments, time_grid
 from sagline.robot.pose import Pose
 
@@ -86,9 +86,7 @@ class _SplineCurve:
                 knots.append(k)
         knots[-1] = len(parameter) - 1
         degree = min(5, len(knots) - 1)
-        aligned = np.sum(pose.quaternion[1:] * pose.quaternion[:-1], axis=1) >= 0.0
-        sign = np.cumprod(np.append(1.0, np.where(aligned, 1.0, -1.0)))
-        columns = (pose.position, pose.quaternion * sign[:, None])  # a quaternion need not have unit length
+        columns = (pose.position, without_sign_changes(pose.quaternion))  # splines need not have unit length
         splines = (make_interp_spline(parameter[knots], values[knots], k=degree) for values in columns)
         self._position, self._quaternion = splines
 
@@ -97,8 +95,8 @@ class _SplineCurve:
         place = [self._position(parameter, order) for order in range(4)]
         q = [self._quaternion(parameter, order) for order in range(4)]
         # w = 2 vec(q' q*)/(q . q) for any length of q: numerator, denominator and their derivatives
-        top = [2.0 * _vector(q[1], q[0]), 2.0 * _vector(q[2], q[0])]
-        top.append(2.0 * _vector(q[3], q[0]) + 2.0 * _vector(q[2], q[1]))
+        top = [2.0 * conjugate_product(q[1], q[0]), 2.0 * conjugate_product(q[2], q[0])]
+        top.append(2.0 * conjugate_product(q[3], q[0]) + 2.0 * conjugate_product(q[2], q[1]))
         below = [np.sum(q[0] * q[k], axis=1)[:, None] * (1.0 if k == 0 else 2.0) for k in range(3)]
         below[2] += 2.0 * np.sum(q[1] * q[1], axis=1)[:, None]
         spin = top[0] / below[0]
@@ -123,11 +121,6 @@ def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
     step = np.diff(time)
     pieces = 0.5 * step * (speed[1:] + speed[:-1]) + step**2 / 12.0 * (growth[:-1] - growth[1:])
     return np.stack((np.append(0.0, np.cumsum(pieces)), speed, growth))
-
-
-def _vector(a: Array, b: Array) -> Array:
-    """Vector part of the quaternion product a b*, scalars last, shapes (N, 4) -> (N, 3)."""
-    return np.asarray(b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3]))
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
