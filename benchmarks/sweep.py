@@ -103,9 +103,9 @@ def tension_requests() -> Iterator[Row]:
 
 
 def _digest(folder: Path) -> str:
-    from sagline.sweep.folder import open_folder
+    from sagline.sweep.folder import SweepFolder
 
-    return open_folder(folder).digest
+    return SweepFolder(folder).digest
 
 
 PARTS = (in_a_loop_and_on_workers, without_the_start, tension_requests)

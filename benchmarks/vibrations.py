@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.dynamics.vibration.robot_modes import VibrationModel
+from sagline.dynamics.vibration.robot_modes import ReducedModel, VibrationModel
 from tests.dynamics.states import at, middle
 from tests.dynamics.vibration.test_vibration import LOWEST_SIX
 from tests.kernels.dynamics.strings import chain, held, string
@@ -42,7 +42,7 @@ def robots() -> Iterator[Row]:
         off = np.abs(found - expected).max()
         yield Row(f"lowest six of article-suspended at {position}, with cable mass", "1e-5 Hz", f"{off:.0e} Hz")
     state = at("cogiro", (0.0, 0.0, 2.0))
-    setting, found_all = VibrationModel.of(state), sl.vibration(state, up_to=50.0).frequency
+    setting, found_all = VibrationModel(state), sl.vibration(state, up_to=50.0).frequency
     limits = np.linspace(2.0, 50.0, 49)
     equal = sum(int((found_all < limit).sum()) == setting.modes_below(0, limit) for limit in limits)
     yield Row(
@@ -50,7 +50,7 @@ def robots() -> Iterator[Row]:
     )
     few = sl.vibration(state, up_to=UP_TO)
     off_12, off = (np.abs(few.frequency[:n] - found_all[:n]).max() for n in (12, few.count))
-    size = len(setting.reduced(0, UP_TO).matrix)
+    size = len(ReducedModel(setting, 0, UP_TO).matrix)
     shown = f"{off_12:.0e} Hz; all {few.count}: {off:.0e} Hz, {size} unknowns"
     yield Row("cogiro: lowest twelve frequencies, with modes up to 20 Hz and up to 50 Hz", "1e-5 Hz", shown)
 
@@ -59,9 +59,9 @@ def speed() -> Iterator[Row]:
     """Times of vibrations, maps and responses."""
     for name in ("cogiro", "article-suspended"):
         state = middle(name)
-        setting = VibrationModel.of(state)
+        setting = VibrationModel(state)
         taken = 1e3 * best_seconds(lambda state=state: sl.vibration(state, up_to=UP_TO), 40)  # type: ignore[misc]
-        matrix = setting.reduced(0, UP_TO).matrix
+        matrix = ReducedModel(setting, 0, UP_TO).matrix
         alone = 1e3 * best_seconds(lambda matrix=matrix: np.linalg.eigh(matrix), 40)  # type: ignore[misc]
         shown = f"{taken:.1f} ms, of which {alone:.1f} ms for the eigenvalues of {len(matrix)} unknowns"
         yield Row(f"{name}: vibration up to 20 Hz", "<= 3 ms" if name == "cogiro" else "none", shown)

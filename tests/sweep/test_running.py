@@ -167,7 +167,7 @@ def test_a_request_is_saved_exactly(tmp_path: Path) -> None:
         around=sl.WrenchBox(5.0) + sl.WrenchEllipsoid([1, 2, 3], 0.5) + sl.WrenchPolytope(np.eye(6)),
         moment_arm=0.3,
     )
-    found = sweep_folder.open_folder(in_tasks(tmp_path / "sweep", request, SIZE))
+    found = sweep_folder.SweepFolder(in_tasks(tmp_path / "sweep", request, SIZE))
     assert sweep_folder.request_digest(found.request) == sweep_folder.request_digest(request) == found.digest
     for name in ("center", "segments", "ellipsoids", "corners", "sizes", "accelerations"):
         np.testing.assert_array_equal(getattr(found.request.around, name), getattr(request.around, name))
@@ -198,7 +198,7 @@ def test_other_folders_are_not_changed(tmp_path: Path, what: str) -> None:
 
 def test_one_process_at_a_time_works_on_a_sweep(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
-    with sweep_result.open_marks(sweep_folder.open_folder(folder)), refused(kind=sl.FileError, file=folder) as caught:
+    with sweep_result.open_marks(sweep_folder.SweepFolder(folder)), refused(kind=sl.FileError, file=folder) as caught:
         sl.sweep.run(planar(), folder, workers=1)
     assert str(caught.value).replace(str(folder), "FOLDER") == snapshot
 
@@ -312,5 +312,5 @@ def test_a_folder_can_be_moved(tmp_path: Path) -> None:
 
 
 def found_bits(folder: Path) -> bytes:
-    status: np.ndarray[Any, Any] = sweep_folder.open_folder(folder).group["status"][...]  # type: ignore[index,assignment]
+    status: np.ndarray[Any, Any] = sweep_folder.SweepFolder(folder).group["status"][...]  # type: ignore[index,assignment]
     return status.tobytes()

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,15 +61,53 @@ SHAPES: Final = {  # dimensions of each array in a set of loads
 STEP: Final = "Free some space or correct the permissions, and run the same sweep again to continue."
 
 
-class SweepFolder(NamedTuple):
-    """Open folder of a sweep."""
+class SweepFolder:
+    """Open folder of a sweep.
 
-    path: Path
-    group: Group  # Zarr group
-    request: Request
-    digest: str  # digest of the request
-    size: tuple[int, int]  # numbers of poses and wrenches in a task; a task has one robot
-    made_by: str  # version of sagline that created the folder
+    Attributes:
+        path: The folder.
+        group: Zarr group.
+        request: The request.
+        digest: Digest of the request.
+        size: Numbers of poses and wrenches in a task; a task has one robot.
+        made_by: Version of sagline that created the folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the folder of a sweep and read the request; raises FileError for a missing or damaged sweep."""
+        import zarr
+
+        self.path = path
+        check_package("zarr", "sweeps")
+        if not path.is_dir():
+            raise FileError(path, "is not a folder", FORMAT.give)
+        try:
+            self.group: Group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)
+            attributes: dict[str, Any] = dict(self.group.attrs)
+            given: dict[str, Any] = {name: self.group[name] for name in GIVEN}
+        except (OSError, ValueError, KeyError, TypeError):
+            raise FileError(path, "is not a folder of a sweep", FORMAT.give) from None
+        FORMAT.check(path, attributes)
+        try:
+            texts = list(attributes["robots"])
+            self.request = Request(
+                [parse_robot(text, f"{path}, robot {k}") for k, text in enumerate(texts)],
+                Pose.from_quaternion(given["position"][:], given["quaternion"][:]),
+                given["wrench"][:],
+                attributes["quantities"],
+                model=choice_of(path, attributes, "model", models_by_name()),
+                tension=choice_of(path, attributes, "tension", methods_by_name()),
+                around=_set_of(attributes["around"]),
+                moment_arm=attributes["moment_arm"],
+            )
+            self.size = int(attributes["task_poses"]), int(attributes["task_wrenches"])
+            self.made_by, self.digest = str(attributes["source"]), str(attributes["digest"])
+        except (KeyError, ValueError, TypeError, RuntimeError, OSError) as error:
+            if isinstance(error, InvalidValueError):
+                raise FileError.of(path, error) from None
+            raise FileError(path, f"is damaged ({type(error).__name__}: {error})", FORMAT.again) from None
+        if self.digest != request_digest(self.request) or min(self.size) < 1:
+            raise FileError(path, "has changed since its creation, because its digest differs", FORMAT.again)
 
     @property
     def grid(self) -> tuple[int, int, int]:
@@ -140,43 +178,6 @@ def make_folder(path: Path, request: Request, size: tuple[int, int]) -> None:
             return  # another process has created the folder, which is checked when it is opened
         reason = f"cannot be created ({error.strerror or error})"
         raise FileError(path, reason, "Check its name, the permissions and the space on the disk.") from None
-
-
-def open_folder(path: Path) -> SweepFolder:
-    """Open the folder of a sweep and read the request; raises FileError for a missing or damaged sweep."""
-    import zarr
-
-    check_package("zarr", "sweeps")
-    if not path.is_dir():
-        raise FileError(path, "is not a folder", FORMAT.give)
-    try:
-        group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)
-        attributes: dict[str, Any] = dict(group.attrs)
-        given: dict[str, Any] = {name: group[name] for name in GIVEN}
-    except (OSError, ValueError, KeyError, TypeError):
-        raise FileError(path, "is not a folder of a sweep", FORMAT.give) from None
-    FORMAT.check(path, attributes)
-    try:
-        texts = list(attributes["robots"])
-        request = Request(
-            [parse_robot(text, f"{path}, robot {k}") for k, text in enumerate(texts)],
-            Pose.from_quaternion(given["position"][:], given["quaternion"][:]),
-            given["wrench"][:],
-            attributes["quantities"],
-            model=choice_of(path, attributes, "model", models_by_name()),
-            tension=choice_of(path, attributes, "tension", methods_by_name()),
-            around=_set_of(attributes["around"]),
-            moment_arm=attributes["moment_arm"],
-        )
-        size = int(attributes["task_poses"]), int(attributes["task_wrenches"])
-        made_by, digest = str(attributes["source"]), str(attributes["digest"])
-    except (KeyError, ValueError, TypeError, RuntimeError, OSError) as error:
-        if isinstance(error, InvalidValueError):
-            raise FileError.of(path, error) from None
-        raise FileError(path, f"is damaged ({type(error).__name__}: {error})", FORMAT.again) from None
-    if digest != request_digest(request) or min(size) < 1:
-        raise FileError(path, "has changed since its creation, because its digest differs", FORMAT.again)
-    return SweepFolder(path, group, request, digest, size, made_by)
 
 
 def request_digest(request: Request) -> str:

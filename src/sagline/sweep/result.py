@@ -19,7 +19,7 @@ from sagline.core.numbers import counted
 from sagline.core.results import Result
 from sagline.files.variables import PARTS
 from sagline.files.writing import try_lock
-from sagline.sweep.folder import GROUP, STEP, SweepFolder, check_package, open_folder
+from sagline.sweep.folder import GROUP, STEP, SweepFolder, check_package
 from sagline.sweep.request import Request, variables_of
 from sagline.sweep.work import Counts
 
@@ -170,7 +170,7 @@ class Sweep(Result):
             FileError: If a chunk is damaged.
         """
         choice(name, "name", self.names)
-        array: Any = open_folder(self.folder).group[name]
+        array: Any = SweepFolder(self.folder).group[name]
         parts = index if isinstance(index, tuple) else (index,)
         if not parts:
             check_memory(f"all of {name}", 2.0 * array.nbytes, "Give an index that selects a part.")
@@ -219,7 +219,7 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
     """
     path = file_path(folder, "folder", folder=True)
     check_package("zarr", "sweeps")
-    opened = open_folder(path)
+    opened = SweepFolder(path)
     marks = _read_marks(opened)
     seconds = sum(seconds for seconds, _ in marks.values())
     outcomes = np.array([counts for _, counts in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))

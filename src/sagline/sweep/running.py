@@ -27,7 +27,6 @@ from sagline.sweep.folder import (
     check_package,
     is_installed,
     make_folder,
-    open_folder,
     request_digest,
 )
 from sagline.sweep.request import Request
@@ -122,7 +121,7 @@ def run(
 
 def open_matching_folder(path: Path, request: Request) -> SweepFolder:
     """Open the folder of a sweep; raises an error if the folder contains another request than `request`."""
-    opened = open_folder(path)
+    opened = SweepFolder(path)
     if opened.digest != request_digest(request):
         step = "Give another folder, or remove this one."
         raise FileError(path, f"contains another sweep, of {len(opened.request):,} requests", step)

@@ -18,7 +18,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
-from sagline.sweep.folder import SweepFolder, check_made_here, open_folder, unknown_value
+from sagline.sweep.folder import SweepFolder, check_made_here, unknown_value
 from sagline.sweep.request import Request, RequestBox, variables_of
 from sagline.tension.method import Options, kernel_options
 from sagline.workspaces.margin import MarginRows, MarginStatus
@@ -162,7 +162,7 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
 @lru_cache(maxsize=4)
 def _opened(folder: str, digest: str) -> SweepFolder:
     """Folder of a sweep, which stays open for the next tasks; raises an error if its digest is not `digest`."""
-    found = open_folder(Path(folder))
+    found = SweepFolder(Path(folder))
     if found.digest != digest:
         step = "Give all workers access to the same folder under the same name."
         raise FileError(folder, "contains another sweep when a worker opens it", step)

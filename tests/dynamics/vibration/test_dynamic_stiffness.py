@@ -25,7 +25,7 @@ def test_at_rest_it_is_the_static_stiffness(name: str) -> None:
     static = sl.stiffness(state).cable_stiffness
     size = np.abs(static).max(axis=(1, 2))[:, None, None]
     assert (np.abs(sl.dynamic_stiffness(state, 0.0) - static) <= 1e-11 * size).all()
-    components = CableComponents(VibrationModel.of(state).strings, 0, 0.1)
+    components = CableComponents(VibrationModel(state).strings, 0, 0.1)
     points = components.points
     last = np.array([one[np.flatnonzero(~np.isnan(one[:, 0]))[-1]] for one in points])
     xx, xz, zz, yy = last[:, 2:].T
@@ -64,7 +64,7 @@ def test_two_thousand_extreme_cables_at_rest() -> None:
 @pytest.mark.parametrize("name", wide(["cogiro", "article-suspended", "expo2015-lucia", "ipanema-2-pulleys"], first=3))
 def test_component_modes_agree_with_the_exact_stiffness(name: str) -> None:
     state = middle(name)
-    components = CableComponents(VibrationModel.of(state).strings, 0, 80.0)
+    components = CableComponents(VibrationModel(state).strings, 0, 80.0)
     static = sl.stiffness(state).cable_stiffness
     for frequency in (1.0, 8.0, 16.0, 19.5):  # no frequency near that of a cable, which would magnify rounding
         exact = sl.dynamic_stiffness(state, frequency).real - static

@@ -52,6 +52,6 @@ def test_robots_with_slightly_wrong_lengths_have_results(name: str, count: int) 
         if not np.isfinite(lowest):
             continue
         found = sl.vibration(state, up_to=4.0 * float(lowest))
-        slack = np.flatnonzero(~VibrationModel.of(state).strings.taut[0])
+        slack = np.flatnonzero(~VibrationModel(state).strings.taut[0])
         assert found.complete or list(found.slack_cables) == slack.tolist() != []
         assert found.count == found.frequency.size

@@ -38,7 +38,7 @@ def test_every_frequency_by_the_exact_count(name: str) -> None:
     """k - 1 modes are below f - 1e-5 Hz, and k modes below f + 1e-5 Hz: all are exact, none is missed."""
     state = middle(name)
     up_to = 0.5 if name == "fast" else 10.0
-    found, setting = sl.vibration(state, up_to=up_to), VibrationModel.of(state)
+    found, setting = sl.vibration(state, up_to=up_to), VibrationModel(state)
     assert found.complete
     for number, frequency in enumerate(found.frequency):
         twins = int((np.abs(found.frequency - frequency) < 2e-5).sum()) - 1
@@ -49,7 +49,7 @@ def test_every_frequency_by_the_exact_count(name: str) -> None:
 
 def test_the_count_at_frequencies_to_fifty_hertz() -> None:
     state = middle("cogiro")
-    setting, found = VibrationModel.of(state), sl.vibration(state, up_to=50.0)
+    setting, found = VibrationModel(state), sl.vibration(state, up_to=50.0)
     assert found.complete
     for frequency in (2.0, 4.1, 11.3, 20.0, 33.3, 49.9):
         assert (found.frequency < frequency).sum() == setting.modes_below(0, frequency)
@@ -75,7 +75,7 @@ def test_shapes_have_the_stated_energy(name: str) -> None:
     energy = simpson((found.cable_shape**2).sum(axis=-1), dx=1.0 / (points - 1), axis=2)
     energy *= state.one_robot.cables.linear_density * cables.unstrained_length
     assert pytest.approx(found.cable_share, abs=3e-6) == energy.T
-    ends = VibrationModel.of(state).ends[0] @ found.shape
+    ends = VibrationModel(state).ends[0] @ found.shape
     assert np.moveaxis(found.cable_shape[:, :, -1], 0, -1) == pytest.approx(ends, abs=1e-12)
 
 
@@ -95,7 +95,7 @@ def test_losses_agree_with_roots_in_the_complex_plane(name: str) -> None:
 
 def _root(state: sl.Equilibrium, damping: sl.Damping, omega: complex) -> complex:
     """Root of det D near a complex frequency, by the secant method."""
-    setting = VibrationModel.of(state)
+    setting = VibrationModel(state)
     static = np.abs(np.linalg.det(_dynamic_matrix(setting, 0, np.zeros((8, 3, 3)), 0.0)))
 
     def determinant(at: complex) -> complex:
@@ -136,7 +136,7 @@ def test_a_platform_on_weightless_cables_agrees_with_modes() -> None:
 def test_elastic_cables_without_weight_vibrate() -> None:
     robot = sl.load_robot("cogiro")
     state = sl.inverse(robot, sl.Pose((0.5, 0.3, 2.0), np.eye(3)), sl.Elastic()).state
-    found, setting = sl.vibration(state, up_to=12.0), VibrationModel.of(state)
+    found, setting = sl.vibration(state, up_to=12.0), VibrationModel(state)
     assert found.complete
     assert found.count > 16
     assert setting.modes_below(0, 12.0) == found.count
@@ -243,7 +243,7 @@ def test_modes_above_the_first_string_frequency_are_marked(name: str) -> None:
 def _first_string(state: sl.Equilibrium) -> float:
     from tests.kernels.dynamics.strings import held
 
-    table = VibrationModel.of(state).strings.table[0]
+    table = VibrationModel(state).strings.table[0]
     return min(held(table[i : i + 1], 1, plane, 1e-6) for i in range(len(table)) for plane in (0, 1))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -56,14 +55,26 @@ def _integrals(weights: Array, values: Array) -> Array:
 _TINY = 1e-300
 
 
-class PlaneModes(NamedTuple):
-    """Modes of the taut cables, either in the plane or normal to the plane, k modes per cable."""
+class PlaneModes:
+    """Fixed-end modes of the taut cables, either in the plane or normal to the plane, k modes per cable.
 
-    # the u unknowns of a cable are displacements times the root of the node's mass
-    rest: Array  # quasi-static shape of the nodes for a displaced platform end, shape (t, u, d)
-    square: Array  # angular frequencies squared, ascending [1/s^2], shape (t, k)
-    shape: Array  # mode shapes at the nodes, shape (t, u, k)
-    drive: Array  # modal force per acceleration of the platform end, shape (t, k, d)
+    The u unknowns of a cable are displacements times the root of the node's mass.
+
+    Attributes:
+        rest: Quasi-static shape of the nodes for a displaced platform end, shape (t, u, d).
+        square: Angular frequencies squared, ascending [1/s^2], shape (t, k).
+        shape: Mode shapes at the nodes, shape (t, u, k).
+        drive: Modal force per acceleration of the platform end, shape (t, k, d).
+    """
+
+    def __init__(self, matrix: Array, rest: Array, free: Flags, first: int) -> None:
+        """Solve the eigenproblem without the unknowns that are fixed in all cables."""
+        last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
+        self.rest = rest
+        self.square, own = np.linalg.eigh(matrix[:, first:last, first:last])
+        self.shape = np.zeros((*matrix.shape[:2], last - first))
+        self.shape[:, first:last] = own
+        self.drive = np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last]
 
 
 class CableComponents:
@@ -96,8 +107,8 @@ class CableComponents:
         spectral.spectral_matrices(self.table, self.omega, _lobatto(), self.points, plane, normal, carried, mass)
         free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is fixed
         first = 0 if self.table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
-        inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
-        aside = _motions(normal, carried[:, :, 4:], free, first)
+        inside = PlaneModes(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
+        aside = PlaneModes(normal, carried[:, :, 4:], free, first)
         self.plane, self.normal = inside, aside
         self.square = np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1)))
         self.cable = np.concatenate([np.repeat(self.taut, modes.square.shape[1]) for modes in (inside, aside)])
@@ -162,15 +173,6 @@ class CableComponents:
         matrices = np.empty((self.taut.size, 2 * n, 2 * n))
         spectral.stretch_matrices(self.table, self.omega, _lobatto(), self.points, matrices)
         return matrices
-
-
-def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
-    """Fixed-end modes in one plane, without the unknowns that are fixed in all cables."""
-    last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
-    square, own = np.linalg.eigh(matrix[:, first:last, first:last])
-    shape = np.zeros((*matrix.shape[:2], last - first))
-    shape[:, first:last] = own
-    return PlaneModes(rest, square, shape, np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last])
 
 
 def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import permutations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,17 +18,6 @@ _SMOOTH = 0.1  # up to this value of w L/(N_A + N_B), twelve integration points 
 _POINTS, _SHARES = (0.5 * np.array(values) for values in np.polynomial.legendre.leggauss(12))
 _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 _TINY = np.finfo(float).tiny
-
-
-class Flexibility(NamedTuple):
-    """Derivatives of the flexibility (symmetric matrix [m/N], world axes) of every cable."""
-
-    # with respect to the force on the platform end, symmetric in all axes [m/N^2], shape (..., m, 3, 3, 3)
-    by_force: Array
-    by_length: Array  # with respect to the length of cable added at the frame end [1/N], shape (..., m, 3, 3)
-    by_density: Array  # with respect to the linear density [m^2/(N kg)], shape (..., m, 3, 3)
-    by_stiffness: Array  # with respect to the axial stiffness [m/N^2], shape (..., m, 3, 3)
-    stretch: Array  # stretch part: integral of t t^T/EA ds with the tangent t [m/N], shape (..., m, 3, 3)
 
 
 class _CatenaryState:
@@ -58,33 +46,41 @@ class _CatenaryState:
         self.smooth = weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
 
 
-def flexibility(state: Equilibrium, force: Array) -> Flexibility:
-    """Compute the flexibility derivatives of the free spans."""
-    # shapes: force (..., m, 3) [N]
-    cables = state.cables
-    length = cables.unstrained_length
-    stiffness = np.broadcast_to(cables.cable.axial_stiffness, length.shape)
-    gravity = 0.0 if cables.model.weightless else cables.gravity
-    weight = gravity * np.broadcast_to(cables.cable.linear_density, length.shape)
-    axes = _axes(force)
-    with np.errstate(all="ignore"):
-        hung = _CatenaryState(cables, weight)
-        slack = (hung.size_b == 0.0) & (weight == 0.0)
-        by_force, by_weight, outer = _by_force(hung), _by_weight(hung), _outer(hung)
-        by_length = flexibility_per_length(np.stack((hung.h, np.zeros_like(hung.h), hung.a), axis=-1), stiffness)
+class Flexibility:
+    """Derivatives of the displacement of a cable's platform end per force, without pulleys and dead length.
 
-    def world(matrix: Array) -> Array:
-        held = np.where(slack[..., None, None], 0.0, matrix)
-        return np.asarray(np.swapaxes(axes, -1, -2) @ held @ axes)
+    Attributes:
+        by_force: With respect to the force on the platform end, symmetric in all axes [m/N^2], shape
+            (..., m, 3, 3, 3).
+        by_length: With respect to the length of cable added at the frame end [1/N], shape (..., m, 3, 3).
+        by_density: With respect to the linear density [m^2/(N kg)], shape (..., m, 3, 3).
+        by_stiffness: With respect to the axial stiffness [m/N^2], shape (..., m, 3, 3).
+        stretch: Stretch part: integral of t t^T/EA ds with the tangent t [m/N], shape (..., m, 3, 3).
+    """
 
-    by_force = np.where(slack[..., None, None, None], 0.0, by_force)
-    return Flexibility(
-        by_force=np.einsum("...abc,...ai,...bj,...ck->...ijk", by_force, axes, axes, axes, optimize=True),
-        by_length=world(by_length),
-        by_density=gravity * world(by_weight),
-        by_stiffness=world(np.eye(3) * (-length / stiffness**2)[..., None, None]),
-        stretch=world(outer / stiffness[..., None, None]),
-    )
+    def __init__(self, state: Equilibrium, force: Array) -> None:
+        """Derivatives of the free spans; `force`: on the platform ends, (..., m, 3) [N]."""
+        cables = state.cables
+        length = cables.unstrained_length
+        stiffness = np.broadcast_to(cables.cable.axial_stiffness, length.shape)
+        gravity = 0.0 if cables.model.weightless else cables.gravity
+        weight = gravity * np.broadcast_to(cables.cable.linear_density, length.shape)
+        axes = _axes(force)
+        with np.errstate(all="ignore"):
+            hung = _CatenaryState(cables, weight)
+            slack = (hung.size_b == 0.0) & (weight == 0.0)
+            by_force, by_weight, outer = _by_force(hung), _by_weight(hung), _outer(hung)
+            by_length = flexibility_per_length(np.stack((hung.h, np.zeros_like(hung.h), hung.a), axis=-1), stiffness)
+
+        def world(matrix: Array) -> Array:
+            held = np.where(slack[..., None, None], 0.0, matrix)
+            return np.asarray(np.swapaxes(axes, -1, -2) @ held @ axes)
+
+        by_force = np.where(slack[..., None, None, None], 0.0, by_force)
+        self.by_force = np.einsum("...abc,...ai,...bj,...ck->...ijk", by_force, axes, axes, axes, optimize=True)
+        self.by_length, self.by_density = world(by_length), gravity * world(by_weight)
+        self.by_stiffness = world(np.eye(3) * (-length / stiffness**2)[..., None, None])
+        self.stretch = world(outer / stiffness[..., None, None])
 
 
 def _axes(force: Array) -> Array:
@@ -213,7 +209,7 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
     slopes, strings = cable_slopes(state), strings_of(state)
     taut = strings.taut[0]
     behind = _behind(strings)
-    compliance = flexibility(state, slopes.force).stretch + behind[:, :, None] * behind[:, None, :]
+    compliance = Flexibility(state, slopes.force).stretch + behind[:, :, None] * behind[:, None, :]
     force = slopes.blocks @ end_displacements(state, platform.shape)
     energy = np.einsum("min,mij,mjn->n", force[taut], compliance[taut], force[taut])
     return np.asarray(0.5 * omega * loss_time * energy / omega**2)

@@ -128,7 +128,7 @@ def frequency_map(
     found = np.full((5, len(poses)), np.nan)
     for part in blocks(len(poses), BLOCK, report):
         own = state[part]
-        model = VibrationModel.of(own)
+        model = VibrationModel(own)
         for k in range(len(own)):
             index = part.start + k
             status[index], massless, _ = status_of(model, k)
@@ -153,7 +153,7 @@ def _numbers_of_pose(
     first = found.platform[:, 0]
     receptance = _modal_receptance(found, rest, damping.modal_damping)
     if damping.loss_time > 0.0 or damping.air_damping > 0.0:
-        exact = Receptance(model.at(row), cable_slopes(state[row]), damping)
+        exact = Receptance(VibrationModel(state[row]), cable_slopes(state[row]), damping)
         held = exact.fixed_end_modes(up_to)
 
         def receptance(frequency: Array) -> Complex:

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import check_model, check_solved, single_state
-from sagline.dynamics.vibration.flexibility import Flexibility, flexibility, flexibility_per_length
+from sagline.dynamics.vibration.flexibility import Flexibility, flexibility_per_length
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.kernels.dynamics.collocation import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.kernels.dynamics.string import SMOOTH, TINY
@@ -107,7 +107,7 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
     found = modes(rest.state) if vibrating is None else vibrating
     groups = list(_groups(found.frequency, together))
     if vibrating is None:
-        flexible = flexibility(rest.state, rest.slopes.force)
+        flexible = Flexibility(rest.state, rest.slopes.force)
         swings = [_massless(rest, flexible, found.shape[:, k], found.frequency[k]) for k in groups]
     else:
         cables = _string_data(rest)

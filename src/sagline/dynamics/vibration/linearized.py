@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, single_state
-from sagline.dynamics.vibration.flexibility import flexibility
+from sagline.dynamics.vibration.flexibility import Flexibility
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, frame_end_forces, motions_of_ends, on_platform
 from sagline.statics.stiffness import mass_matrix, modes
@@ -199,7 +199,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
     m = state.one_robot.cable_count
     if not loss_time:
         return np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m)
-    follows = loss_time * slopes.blocks @ flexibility(state, slopes.force).stretch
+    follows = loss_time * slopes.blocks @ Flexibility(state, slopes.force).stretch
     per_motion = follows @ slopes.blocks  # N s/m, at the platform ends
     per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # cable that is paid out has no strain
     if not np.isfinite(per_motion).all():

@@ -206,7 +206,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
         raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give at least one.")
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Split them into parts.")
     known = optional(damping, Damping, "damping") or Damping()
-    model = VibrationModel.of(state)
+    model = VibrationModel(state)
     check_solved(state)
     highest = float(given.max())
     model.checked_count(0, max(highest, LOWEST), "frequency")

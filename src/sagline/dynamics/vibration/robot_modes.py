@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -24,29 +24,28 @@ LEVELS = 4  # number of matched pairs of moments (Krylov) of the higher modes
 _TINY = 1e-300
 
 
-class VibrationModel(NamedTuple):
-    """Stiffness, mass and cables of N states, for the computation of vibrations."""
+class VibrationModel:
+    """Stiffness, mass and cables of N states, for the computation of vibrations.
 
-    strings: Strings  # data of the cables
-    ends: Array  # matrices that map the platform motion to the motion of the platform ends, shape (N, m, 3, 6)
-    stiffness: Array  # stiffness of the platform, symmetric, shape (N, 6, 6)
-    mass: Array  # mass matrix of the platform, shape (N, 6, 6)
-    freedom: Array  # matrix that selects the free motions, shape (n, 6)
+    Attributes:
+        strings: Data of the cables.
+        ends: Matrices that map the platform motion to the motion of the platform ends, shape (N, m, 3, 6).
+        stiffness: Stiffness of the platform, symmetric, shape (N, 6, 6).
+        mass: Mass matrix of the platform, shape (N, 6, 6).
+        freedom: Matrix that selects the free motions, shape (n, 6).
+    """
 
-    @classmethod
-    def of(cls, state: Equilibrium) -> VibrationModel:
-        """Vibration model of one equilibrium or of N equilibria. The arrays have a leading axis in both cases."""
+    def __init__(self, state: Equilibrium) -> None:
+        """Model of one equilibrium or of N equilibria. The arrays have a leading axis in both cases."""
         slopes = cable_slopes(state)
         matrix = slopes.matrix.reshape(-1, 6, 6)
         levers = slopes.levers.reshape(len(matrix), -1, 3)
-        stiffness, mass = 0.5 * (matrix + np.swapaxes(matrix, -1, -2)), mass_matrix(state).reshape(-1, 6, 6)
-        return cls(strings_of(state), motions_of_ends(levers), stiffness, mass, first_of(state.robot).freedom)
-
-    def at(self, row: int) -> VibrationModel:
-        """The model of the state `row`, with a leading axis of length 1."""
-        part = slice(row, row + 1)
-        strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
-        return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
+        self.strings, self.ends, self.freedom = (
+            strings_of(state),
+            motions_of_ends(levers),
+            first_of(state.robot).freedom,
+        )
+        self.stiffness, self.mass = 0.5 * (matrix + np.swapaxes(matrix, -1, -2)), mass_matrix(state).reshape(-1, 6, 6)
 
     def massless_modes(self, row: int) -> tuple[Array, Array]:
         """Natural frequencies with massless cables (n,) [Hz], and unstable directions of the platform (6, d)."""
@@ -77,7 +76,7 @@ class VibrationModel(NamedTuple):
         """Modes of the state `row` below `up_to` [Hz]. The exact count checks the number of modes."""
         _check_string_count(self.strings, row, up_to)
         count = self.checked_count(row, up_to, "up_to")
-        problem = _ReducedModel(self, row, up_to)
+        problem = ReducedModel(self, row, up_to)
         square, vectors = np.linalg.eigh(problem.matrix)
         frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
         border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
@@ -92,7 +91,7 @@ class VibrationModel(NamedTuple):
         return StateModes(frequency[:count], platform, self.ends[row] @ platform, problem, vectors)
 
 
-class _ReducedModel:
+class ReducedModel:
     """Eigenproblem of one state for its modes below a frequency.
 
     Attributes:
@@ -181,7 +180,7 @@ class StateModes:
     frequency: Array  # [Hz], shape (K,); K is the exact count
     platform: Array  # platform motion, shape (6, K)
     ends: Array  # displacements of the platform ends, shape (m, 3, K)
-    problem: _ReducedModel  # reduced model of the modes
+    problem: ReducedModel  # reduced model of the modes
     vectors: Array  # eigenvectors of the reduced model, shape (n + k, K)
 
     @property

@@ -190,7 +190,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
     check_model(single_state(state))
     limit = number(up_to, "up_to", "Hz", above=0.0)
     given = optional(damping, Damping, "damping") or Damping()
-    model = VibrationModel.of(state)
+    model = VibrationModel(state)
     status, massless, unstable = status_of(model, 0)
     cables, none, count = state.cables.shape[-1], np.empty(0), 0
     arrays = {  # without modes
