@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.kernels import library
-from sagline.kernels.cable.batch import batch_end
 from sagline.kernels.calibration.observe import starting_lengths
+from sagline.kernels.dynamics.progress import read_cells
 from sagline.kernels.dynamics.rigid_body import platform_state
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses
@@ -43,10 +43,10 @@ def run(chosen: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", POSITION], capture_output=True, text=True, env=environment)
 
 
-def ends(count: int = 4) -> tuple[Array, ...]:
-    """Arguments of `batch_end`: forces, lengths, weights and stiffnesses, and arrays for the ends."""
-    numbers = np.random.default_rng(3).uniform(1.0, 2.0, (4, count))
-    return (*(10.0 * numbers[:2]), numbers[2], numbers[3], 1e4 * numbers[0], np.zeros(count), np.zeros(count))
+def cells(count: int = 4) -> tuple[Array, ...]:
+    """Arguments of `read_cells`: tensions, gains, biases, deviations and ranges, noise, and an array for readings."""
+    numbers = np.random.default_rng(3).uniform(1.0, 2.0, (6, count))
+    return 10.0 * numbers[0], np.concatenate((numbers[1:4], 1e4 * numbers[4:5])), numbers[5], np.zeros(count)
 
 
 def test_the_tests_run_the_compiled_library() -> None:
@@ -111,42 +111,42 @@ BAD: dict[str, Callable[[Array], Any]] = {
 }
 
 
-@given(place=st.integers(0, 6), kind=st.sampled_from(sorted(BAD)))
+@given(place=st.integers(0, 3), kind=st.sampled_from(sorted(BAD)))
 def test_arguments_of_other_types_are_refused_before_anything_is_written(place: int, kind: str) -> None:
-    arguments: list[Any] = list(ends())
+    arguments: list[Any] = list(cells())
     arguments[place] = BAD[kind](arguments[place])
-    for call in (lambda: batch_end(*arguments), lambda: bound(batch_end, *arguments)):
-        with pytest.raises(TypeError, match="batch_end"):
+    for call in (lambda: read_cells(*arguments), lambda: bound(read_cells, *arguments)):
+        with pytest.raises(TypeError, match="read_cells"):
             call()
-    assert not any(np.any(each) for k, each in enumerate(arguments[5:], 5) if k != place)
+    assert not any(np.any(each) for k, each in enumerate(arguments[3:], 3) if k != place)
 
 
 def test_too_few_arguments_are_refused() -> None:
-    with pytest.raises(TypeError, match="batch_end"):
-        batch_end(*ends()[:-1])
+    with pytest.raises(TypeError, match="read_cells"):
+        read_cells(*cells()[:-1])
 
 
 def test_arrays_with_an_explicit_native_byte_order_are_accepted() -> None:
     """Unpickled data contains such arrays, for example in a sweep."""
-    expected = ends()
-    stated = [each.astype(each.dtype.newbyteorder(sys.byteorder)) for each in ends()]
+    expected = cells()
+    stated = [each.astype(each.dtype.newbyteorder(sys.byteorder)) for each in cells()]
     assert stated[0].data.format != expected[0].data.format
-    batch_end(*expected)
-    batch_end(*stated)
-    assert np.any(stated[5])
+    read_cells(*expected)
+    read_cells(*stated)
+    assert np.any(stated[3])
     for one, other in zip(stated, expected, strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_a_bound_entry_sees_new_values_of_its_arrays() -> None:
-    arguments = ends()
-    call = bound(batch_end, *arguments)
+    arguments = cells()
+    call = bound(read_cells, *arguments)
     arguments[0][:] = np.random.default_rng(4).uniform(20.0, 30.0, 4)
     call()
-    expected = ends()
+    expected = cells()
     expected[0][:] = arguments[0]
-    batch_end(*expected)
-    assert np.any(arguments[5])
+    read_cells(*expected)
+    assert np.any(arguments[3])
     for one, other in zip(arguments, expected, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -193,8 +193,8 @@ def test_an_entry_has_the_name_and_docstring_of_its_source() -> None:
 
 
 def test_other_threads_run_during_a_kernel() -> None:
-    arguments, count = ends(2_000_000), 0
-    worker = threading.Thread(target=lambda: [batch_end(*arguments) for _ in range(5)])
+    arguments, count = cells(2_000_000), 0
+    worker = threading.Thread(target=lambda: [read_cells(*arguments) for _ in range(50)])
     worker.start()
     while worker.is_alive():
         count += 1

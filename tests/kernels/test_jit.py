@@ -131,9 +131,9 @@ def test_a_full_disk_costs_one_line_and_leaves_no_file(
 
 def test_inner_kernels_have_no_wrapper_for_python_and_entries_have() -> None:
     from sagline.kernels.algebra.factors import factor_positive
-    from sagline.kernels.cable.batch import batch_end
+    from sagline.kernels.cable.batch import batch_from_length
 
-    inner, entry = (cast("Any", kernel).targetoptions for kernel in (factor_positive, batch_end))
+    inner, entry = (cast("Any", kernel).targetoptions for kernel in (factor_positive, batch_from_length))
     assert inner["no_cpython_wrapper"]
     assert "no_cpython_wrapper" not in entry
     assert entry["nogil"]

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.batch import batch_end
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.motion import cable_loads
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS
@@ -299,8 +298,6 @@ def entries() -> None:
     there_and_back(turning, 4, 1)
     swivel_angles(turning)
     sl.inverse(turning.replace(winches=sl.Winch(0.05, dead_cable=0.3, on_platform=True)), poses_of(robot, 2, 1))
-    one = np.linspace(1.0, 2.0, 4)
-    batch_end(1e3 * one, 1e2 * one, 5.0 * one, one, 1e5 * one, np.empty(4), np.empty(4))
     cables()
     winches()
     meshes()

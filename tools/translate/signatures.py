@@ -56,7 +56,6 @@ LOADS: Final = (plain_tuple(FLOAT, FLOAT), F2, F1, F2, F1, F2, F2, F2, F2)
 
 # argument types of each entry, by the entry's name and the key of the set
 SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
-    "batch_end": {"": (F1,) * 7},
     "batch_from_length": {"": SOLVED},
     "batch_from_tension": {"": (*SOLVED, F2)},
     "begin_period": {"": (plain_tuple(F1, F1, F1), F1, F1, F2, COURSE, F1, I1, BOOL, BOOL, FLOAT)},

@@ -7,7 +7,7 @@ import pytest
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable import models
-from sagline.kernels.cable.batch import batch_end, batch_from_length, batch_from_tension
+from sagline.kernels.cable.batch import batch_from_length, batch_from_tension
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms
 from sagline.kernels.codes import CABLE_NO_TENSION, CATENARY, ELASTIC, EMPIRICAL, PARABOLIC, STRAIGHT
 from sagline.kernels.tables import BUFFERS, CHUNK
@@ -112,14 +112,3 @@ def test_many_at_their_lengths(code: int) -> None:
             force, verdict = from_length(Model(*terms), x, z, Material(rho, ea), whole)
             np.testing.assert_array_equal((pull_x[i], pull_z[i], found[i]), force)
             assert status[i] == verdict
-
-
-def test_ends_of_many() -> None:
-    span, rise, density, stiffness, tension = cables(40, 0.01)
-    length, horizontal, vertical, _ = solve(
-        (CATENARY, 0.0, 0.0, GRAVITY), span, rise, density, stiffness, tension, count=40
-    )
-    x, z = np.full((2, 40), np.nan)
-    batch_end(horizontal, vertical, length, density * GRAVITY, stiffness, x, z)
-    np.testing.assert_allclose(x, span, rtol=1e-11)
-    np.testing.assert_allclose(z, rise, rtol=1e-11, atol=1e-11)

@@ -109,15 +109,6 @@ def batch_from_length(terms: Terms, cables: Operands, found: tuple[Array, Array,
         status_out[i] = status
 
 
-@entry
-def batch_end(
-    horizontal: Array, vertical: Array, length: Array, weight: Array, stiffness: Array, x_out: Array, z_out: Array
-) -> None:
-    """Platform ends of exact catenaries with given forces and lengths. All operands have one entry per cable."""
-    for i in range(x_out.shape[0]):
-        x_out[i], z_out[i] = models.catenary_end(horizontal[i], vertical[i], length[i], weight[i], stiffness[i])
-
-
 @kernel
 def catenary_point(
     fraction: float, horizontal: float, vertical: float, length: float, weight: float, stiffness: float

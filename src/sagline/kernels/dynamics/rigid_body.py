@@ -19,7 +19,6 @@ CENTER, TURN, VELOCITY, MOMENTUM = 0, 3, 7, 10
 STATE_COLUMNS = 13
 # row of inertia: mass [kg], principal moments [kg m^2], which are infinite for axes about which the body cannot turn
 MASS, MOMENTS = 0, 1
-INERTIA_COLUMNS = 4
 
 Triple = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
