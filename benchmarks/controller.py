@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, print_table
-from sagline.article.ten_poses import table2
+from sagline.article.ten_poses import Table2
 from sagline.control.link import Command, Missing, Sample
 from tests.control.rigs import HOME, Spy, imperfect, rig
 from tests.control.tours import OFF, tour
@@ -34,7 +34,7 @@ def cycles() -> Iterator[Row]:
     """Time of the controller in each cycle, for homing and the ten poses without stops."""
     control, machine = rig(imperfect(zero=2e-3))
     link = control._context.link = Timed(machine.link())
-    path = sl.quintic_path([HOME.position, *table2().desired], speed=0.2)
+    path = sl.quintic_path([HOME.position, *Table2().desired], speed=0.2)
     begin = time.perf_counter()
     motion = control.plan(path)
     planning = time.perf_counter() - begin

@@ -16,7 +16,7 @@ from rich.console import Console
 
 import sagline as sl
 from benchmarks.measure import Row, show
-from sagline.article.ten_poses import table2
+from sagline.article.ten_poses import Table2
 from sagline.control.real_time import set_priority
 from sagline.core.arrays import Array
 from sagline.twin.server import machine_in_process
@@ -45,7 +45,7 @@ class NotedPace(sl.control.Pace):
 
 def tours(control: sl.control.Controller, pace: NotedPace, minutes: float, home: sl.Pose) -> Iterator[Row]:
     """Tours through the ten poses; each tour is planned while the platform is at rest."""
-    path = sl.quintic_path([home.position, *table2().desired, home.position], speed=SPEED)
+    path = sl.quintic_path([home.position, *Table2().desired, home.position], speed=SPEED)
     events = len(control.events)
     pace.late.clear()
     while len(pace.late) * control.period < 60.0 * minutes:

@@ -27,7 +27,7 @@ from sagline.article.explanations import (
     robot_with_errors,
     wound_lengths,
 )
-from sagline.article.ten_poses import HOME, METHOD, table2, tour
+from sagline.article.ten_poses import HOME, METHOD, Table2, tour
 from sagline.core.arrays import Array
 from tests.refusal import refused
 
@@ -43,20 +43,20 @@ class Planned(NamedTuple):
 
     def error(self, errors: Sequence[Errors]) -> Array:
         """Actual minus desired positions [m]."""
-        return rest_positions(ROBOT, self.plan, self.home, errors) - table2().desired
+        return rest_positions(ROBOT, self.plan, self.home, errors) - Table2().desired
 
 
 @pytest.fixture(scope="module")
 def study() -> Planned:
     plan, home = (
         sl.inverse(ROBOT, sl.Pose.from_euler(positions, 0.0, 0.0, 0.0), sl.Empirical(), METHOD)
-        for positions in (table2().desired, np.array([HOME]))
+        for positions in (Table2().desired, np.array([HOME]))
     )
     return Planned(plan, home)
 
 
 def test_table_2_has_distances_for_errors() -> None:
-    table = table2()
+    table = Table2()
     assert table.points == tuple(f"P{k}" for k in range(1, 11))
     assert table.desired[1] == pytest.approx([-0.13, 1.42, 0.68])
     assert table.actual[8] == pytest.approx([0.45, -1.734, 1.727])
@@ -105,7 +105,7 @@ def test_wound_lengths_are_counted_from_the_home_pose(study: Planned) -> None:
 def test_slope_of_the_vertical_error_over_the_height(study: Planned, name: str, slope: float) -> None:
     """Change of the vertical error [mm per m of height] due to a typical error of one parameter."""
     (error,) = study.error([{name: BY_NAME[name].typical}])
-    assert np.polyfit(table2().desired[:, 2], 1e3 * error[:, 2], 1)[0] == pytest.approx(slope, rel=0.02)
+    assert np.polyfit(Table2().desired[:, 2], 1e3 * error[:, 2], 1)[0] == pytest.approx(slope, rel=0.02)
 
 
 def test_a_wrong_drum_changes_nothing_at_home(study: Planned) -> None:
@@ -181,7 +181,7 @@ def test_the_path_stops_at_the_ten_poses() -> None:
     plan, stops = tour()
     path = plan.path
     assert path is not None
-    for stop, desired in zip(stops, table2().desired, strict=True):
+    for stop, desired in zip(stops, Table2().desired, strict=True):
         k = int(np.argmin(np.abs(path.time - stop)))
         assert path.pose.position[k] == pytest.approx(desired, abs=1e-3)
     assert plan.feasible.all()

@@ -164,7 +164,7 @@ def by_differences(case: Case) -> Array:
     parts += [total[: case.positions, m : m + 3] / 1e-3] if case.positions else []
     parts += [total[:, m + 3 :] / 1e-3] if case.rotations else []
     rows = np.vstack([part.reshape(-1, total.shape[2]) for part in parts])
-    rows = rows * PriorUnits.of(parameters).scale
+    rows = rows * PriorUnits(parameters).scale
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     found: Array = (
         rows[size[:, 0] > 0.0] / size[size[:, 0] > 0.0]
@@ -210,7 +210,7 @@ def test_differences_give_the_same_unidentifiable_directions(name: str) -> None:
     values = np.concatenate((values, np.zeros(rows.shape[1] - len(values))))
     assert len(found) == np.sum(values < 1e-7 * values[0])
     vectors = np.array([one.vector for one in found]).reshape(len(found), rows.shape[1])
-    vectors = vectors / PriorUnits.of(asked(case)).units
+    vectors = vectors / PriorUnits(asked(case)).units
     assert np.abs(rows @ vectors.T).max(initial=0.0) < 1e-6 * values[0]
     assert np.linalg.matrix_rank(vectors, tol=1e-3) == len(found)
 
@@ -218,7 +218,7 @@ def test_differences_give_the_same_unidentifiable_directions(name: str) -> None:
 def test_63_parameters_of_the_cogiro() -> None:
     case = CASES["63 of the CoGiRo"]
     assert len(asked(case).names) == 63
-    values = np.linalg.svd(triangle_of(case) * PriorUnits.of(asked(case)).scale)[1]
+    values = np.linalg.svd(triangle_of(case) * PriorUnits(asked(case)).scale)[1]
     assert np.sum(values < 1e-12 * values[0]) == 11
     assert values[51] > 1e-6 * values[0]
 

@@ -38,8 +38,8 @@ def identified(robot: str, unknowns: tuple[str, ...], *, positions: bool = False
     ).matrix
     triangle = append_rows(np.zeros((0, len(parameters.names))), matrix)
     gauge = gauge_of(triangle, parameters, parameters.prior, machine.robot, sensors)
-    rows = matrix.reshape(-1, matrix.shape[2]) * PriorUnits.of(parameters).scale
-    left = np.array([one.vector for one in gauge]).reshape(len(gauge), rows.shape[1]) / PriorUnits.of(parameters).units
+    rows = matrix.reshape(-1, matrix.shape[2]) * PriorUnits(parameters).scale
+    left = np.array([one.vector for one in gauge]).reshape(len(gauge), rows.shape[1]) / PriorUnits(parameters).units
     basis = np.linalg.qr(left.T)[0]
     outside = np.eye(rows.shape[1]) - basis @ basis.T
     scatter: Array = outside @ np.linalg.inv(rows.T @ rows + np.eye(rows.shape[1])) @ outside
@@ -84,7 +84,7 @@ def test_densities_of_ropes_and_mass_of_the_platform() -> None:
 )
 def test_remaining_share_of_the_prior(robot: str, unknowns: tuple[str, ...]) -> None:
     parameters, scatter, found = identified(robot, unknowns)
-    units = PriorUnits.of(parameters).units
+    units = PriorUnits(parameters).units
     for one in found:
         vector = one.vector / units
         np.testing.assert_allclose(np.linalg.norm(vector), one.known, rtol=1e-9)

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 
 import sagline as sl
-from sagline.article.ten_poses import HOME, table2
+from sagline.article.ten_poses import HOME, Table2
 
-TEN_POSES = table2().desired  # m, shape (10, 3)
+TEN_POSES = Table2().desired  # m, shape (10, 3)
 PROTOTYPE = sl.load_robot("article-prototype")
 
 

@@ -313,9 +313,9 @@ def test_a_missing_package_is_reported_in_one_sentence(
 
 @pytest.mark.soak
 def test_fourteen_minutes_with_the_plan_take_twenty_megabytes(tmp_path: Path) -> None:
-    from sagline.article.ten_poses import HOME, table2
+    from sagline.article.ten_poses import HOME, Table2
 
-    stops = np.repeat([HOME, *table2().desired, HOME], [1, *10 * [2], 1], axis=0)
+    stops = np.repeat([HOME, *Table2().desired, HOME], [1, *10 * [2], 1], axis=0)
     durations = [73.0, *10 * [3.0, 73.0]]
     plan = sl.inverse(ROBOT, sl.quintic_path(stops, durations=durations))
     assert len(plan.status) == 83_301

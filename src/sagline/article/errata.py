@@ -11,7 +11,7 @@ import sagline as sl
 from sagline.article import regressions as fits
 from sagline.article.drawing import chapter, finding
 from sagline.article.simulation import METHOD, ROBOTS
-from sagline.article.ten_poses import table2
+from sagline.article.ten_poses import Table2
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table
@@ -222,7 +222,7 @@ def _vertical_and_level() -> Sequence[Number]:
 
 def _error_formula() -> Sequence[Number]:
     """Erratum 9: equation (56) is a sum of vectors B_i - P, but the errors in Table 2 are distances."""
-    table, robot = table2(), sl.load_robot("article-prototype")
+    table, robot = Table2(), sl.load_robot("article-prototype")
     pairs = zip(table.desired, table.actual, strict=True)
     sums = np.array([(robot.platform_anchors + actual - desired).sum(axis=0) for desired, actual in pairs])
     literal = np.linalg.norm(sums, axis=1)
@@ -252,7 +252,7 @@ def _table_number() -> Sequence[Number]:
         and np.array_equal(suspended.frame_size, mixed.frame_size)
     )
     return (
-        ("poses in Table 2", len(table2().points), ""),
+        ("poses in Table 2", len(Table2().points), ""),
         ("cables of either robot", suspended.cable_count, ""),
         ("both robots agree in Table 1's parameters (1: yes)", same, ""),
     )

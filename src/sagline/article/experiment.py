@@ -15,7 +15,7 @@ import numpy as np
 
 import sagline as sl
 from sagline import control
-from sagline.article.ten_poses import HOME, table2
+from sagline.article.ten_poses import HOME, Table2
 from sagline.control.link import PERIOD
 from sagline.core.arrays import Array
 from sagline.core.results import Status
@@ -127,7 +127,7 @@ class Experiment:
         ends: Array,
     ) -> None:
         """Evaluate observations at the stops, plans of the legs, and times (12,) of the ends of the legs."""
-        self.table, self.robot, m = table2(), controller.robot, controller.robot.cable_count
+        self.table, self.robot, m = Table2(), controller.robot, controller.robot.cable_count
         true, estimated, tension, correction = (np.array(column) for column in zip(*stops[1:], strict=True))
         planned = np.array([plan.state.cables.frame_end_tension[-1] for plan in plans])
         seen = [
@@ -188,7 +188,7 @@ def experiment(controller: control.Controller, watch: StopObserver) -> Experimen
     controller.home(sl.Pose(HOME))
     _stand(controller, "home")
     stops, plans, ends = [watch.seen()], list[sl.Plan](), [0.0]
-    for name, leg in zip([*table2().points, "home"], legs, strict=True):
+    for name, leg in zip([*Table2().points, "home"], legs, strict=True):
         first = len(watch.courses)
         done = _executed(controller, leg, name)
         assert done.plan is not None
@@ -238,4 +238,4 @@ def duration() -> float:
 
 def points() -> Array:
     """Positions of all stops [m], shape (12, 3): home, the ten poses, and home."""
-    return np.vstack((HOME, table2().desired, HOME))
+    return np.vstack((HOME, Table2().desired, HOME))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 
 import numpy as np
@@ -16,14 +15,25 @@ from sagline.core.arrays import Array, locked
 from sagline.motion.rest_to_rest import QUINTIC
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Table2:
-    """Table 2 of the article with the printed values."""
+    """Table 2 of the article with the printed values.
 
-    points: tuple[str, ...]  # names of the poses, shape (10,)
-    desired: Array  # desired positions [m], shape (10, 3)
-    actual: Array  # measured positions [m], shape (10, 3)
-    printed_error: Array  # positioning errors as printed [m], shape (10,)
+    Attributes:
+        points: Names of the ten poses.
+        desired: Desired positions [m], shape (10, 3).
+        actual: Measured positions [m], shape (10, 3).
+        printed_error: Positioning errors as printed [m], shape (10,).
+    """
+
+    def __init__(self) -> None:
+        """Read the table from the package."""
+        # source: Gia Luan & Truong Thinh 2020, Table 2
+        text = files("sagline.article").joinpath("data/table2.csv").read_text(encoding="utf-8")
+        rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))[1:]
+        self.points, numbers = tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
+        self.desired: Array = locked(numbers[:, 0:3].copy())
+        self.actual: Array = locked(numbers[:, 3:6].copy())
+        self.printed_error: Array = locked(1e-3 * numbers[:, 6])
 
     @property
     def error(self) -> Array:
@@ -34,20 +44,6 @@ class Table2:
     def distance(self) -> Array:
         """Euclidean distance of actual and desired position [m], shape (10,)."""
         return np.asarray(np.linalg.norm(self.error, axis=1))
-
-
-def table2() -> Table2:
-    """Read the table from the package."""
-    # source: Gia Luan & Truong Thinh 2020, Table 2
-    text = files("sagline.article").joinpath("data/table2.csv").read_text(encoding="utf-8")
-    rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))[1:]
-    numbers = np.array([row[1:] for row in rows], dtype=np.float64)
-    return Table2(
-        points=tuple(row[0] for row in rows),
-        desired=locked(numbers[:, 0:3].copy()),
-        actual=locked(numbers[:, 3:6].copy()),
-        printed_error=locked(1e-3 * numbers[:, 6]),
-    )
 
 
 HOME = (0.0, 0.0, 1.5)  # home position of the prototype [m]
@@ -78,7 +74,7 @@ class TenPoses:
         """Plan the prototype at the ten poses, and search for possible causes of the measured errors."""
         # The fits use exact cables and all sets of up to three parameters, within plausible limits. The remaining error
         # is at least 0.3 mm, because the printed positions are in whole millimeters.
-        table, robot = table2(), sl.load_robot("article-prototype")
+        table, robot = Table2(), sl.load_robot("article-prototype")
         plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 
         def error_of(errors: Sequence[causes.Errors]) -> Array:
@@ -109,7 +105,7 @@ class TenPoses:
 
 def tour(rate: float = 10.0) -> tuple[sl.Plan, Array]:
     """Path of the prototype from home through the ten poses and back, from rest to rest, without stops."""
-    stops = [HOME, *table2().desired, HOME]
+    stops = [HOME, *Table2().desired, HOME]
     path = sl.quintic_path(stops, speed=TOUR_SPEED, rate=rate)
     plan = sl.inverse(sl.load_robot("article-prototype"), path, sl.Empirical(), METHOD)
     way = np.linalg.norm(np.diff(np.asarray(stops), axis=0), axis=1)

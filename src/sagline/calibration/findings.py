@@ -262,7 +262,7 @@ def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Arra
     """Whitened slopes (n, R, P), effects of errors (n, R, m + R), misfit (n, R) and root of the prior (P, P)."""
     m, parameters = found.robot.cable_count, found.parameters
     lengths = np.atleast_2d(found.unstrained_length)[used]
-    scale = PriorUnits.of(parameters).scale
+    scale = PriorUnits(parameters).scale
     step = (parameters.internal(found.values) - parameters.internal(parameters.prior)) / scale
     root = parameters.prior_root * scale
     root *= np.sqrt(len(used) / len(found.rows))  # the prior information per pose is the same as in the whole log

@@ -7,7 +7,8 @@ a convention. See docs/model.md, section 14.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Final, NamedTuple
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from scipy.linalg import null_space
@@ -70,12 +71,12 @@ def gauge_of(
     triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
 ) -> tuple[Direction, ...]:
     """Unobservable directions of the unknowns, with names; only the priors determine values along these directions."""
-    frame = PriorUnits.of(parameters)
+    frame = PriorUnits(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
     unit = np.eye(len(size))
     found = [_direction(*_largest(unit[index], parameters), frame) for index in alone]
-    frame = frame._replace(free=np.setdiff1d(frame.free, alone))
+    frame.free = np.setdiff1d(frame.free, alone)
     left = _open_directions(triangle, frame)
     where = parameters.where[_TURN, 0]
     turn = np.where(where >= 0, values[where], 0.0)  # rotation vector of the measuring system [rad]; zero if known
@@ -220,26 +221,31 @@ _SCALE: Final = "weigh some meters of the cable, measure a distance between anch
 _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
-class _Generator(NamedTuple):
-    """Symmetry: a change of all parameters together that changes no reading."""
+class _Generator:
+    """Symmetry: a change of all parameters together that changes no reading.
 
-    name: str  # name of the quantity
-    step: str  # measurement that fixes the quantity
-    # changes of the parameters, as rows of `kernels.calibration.kinds` (KIND_ROWS, m); of logarithms where estimated
-    change: Array
-    lengths: float = 0.0  # relative change of the lengths off the drums
+    Attributes:
+        name: Name of the quantity.
+        step: Measurement that fixes the quantity.
+        change: Changes of the parameters, as rows of `kernels.calibration.kinds` (KIND_ROWS, m); of logarithms where
+            estimated.
+        lengths: Relative change of the lengths off the drums.
+    """
+
+    def __init__(
+        self, cables: int, name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0
+    ) -> None:
+        """Symmetry of a robot with a number of `cables`; `changes`: rows with their values."""
+        self.name, self.step, self.lengths = name, step, lengths
+        self.change = np.zeros((kinds.KIND_ROWS, cables))
+        for rows, values in changes:
+            self.change[rows] = values
 
 
 def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[_Generator]:
     """Symmetries that have a name; turn: rotation vector (3,) of the measuring system [rad]."""
     m, winches, center, place = robot.cable_count, robot.winches, robot.center_of_mass, sensors.frame.position
-
-    def generator(name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0) -> _Generator:
-        change = np.zeros((kinds.KIND_ROWS, m))
-        for rows, values in changes:
-            change[rows] = values
-        return _Generator(name, step, change, lengths)
-
+    generator = partial(_Generator, m)
     # the linear density decreases, so that forces do not change
     scaled: list[tuple[Any, Array | float]] = [(_FRAME, robot.frame_anchors.T), (_PLATFORM, robot.platform_anchors.T)]
     scaled += [(kinds.DENSITY, -1.0)]

@@ -378,22 +378,23 @@ _FIXED: Final = 5e-2  # a parameter is known if its stated deviation is less tha
 _WIDE: Final = 1e3  # largest used prior deviation, in multiples of the usual deviation of an unknown value
 
 
-class PriorUnits(NamedTuple):
-    """Units in which directions are computed: standard deviations of the priors."""
+class PriorUnits:
+    """Units in which directions are computed: standard deviations of the priors.
 
-    scale: Array  # one standard deviation in the internal parameters, (P,)
-    units: Array  # one standard deviation in the units of the parameters, (P,)
-    free: Indices  # indices of the parameters that do not count as known
+    Attributes:
+        scale: One standard deviation in the internal parameters, (P,).
+        units: One standard deviation in the units of the parameters, (P,).
+        free: Indices of the parameters that do not count as known.
+    """
 
-    @classmethod
-    def of(cls, parameters: Parameters) -> PriorUnits:
+    def __init__(self, parameters: Parameters) -> None:
         """Unit of each parameter: its prior deviation or, without a prior, the usual deviation of an unknown value."""
         # A unit is at most `_WIDE` usual deviations, because rounding would otherwise hide the other parameters.
         size = np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
         usual = parameters.usual_deviation * size
         units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
-        units = np.minimum(units, _WIDE * usual)
-        scale = units / size
+        self.units = np.minimum(units, _WIDE * usual)
+        self.scale = self.units / size
         common = np.array([KINDS[name].deviation for name in parameters.names])
-        fixed = parameters.stated & (scale < _FIXED * common)
-        return cls(scale, units, np.flatnonzero(~fixed).astype(np.int64))
+        fixed = parameters.stated & (self.scale < _FIXED * common)
+        self.free: Indices = np.flatnonzero(~fixed).astype(np.int64)

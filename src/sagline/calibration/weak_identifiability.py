@@ -29,7 +29,7 @@ def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direct
     # The result begins with directions that keep more than the share `LITTLE` of the prior deviation, the largest share
     # first. Next are pairs of parameters with a correlation above `ALIKE`. The last are single parameters that change
     # the readings as a combination of parameters of all cables does.
-    frame = PriorUnits.of(parameters)
+    frame = PriorUnits(parameters)
     complement = _complement(frame, gauge)
     if not complement.shape[1]:
         return ()

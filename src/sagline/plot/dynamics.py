@@ -220,7 +220,7 @@ def response(
         >>> axes = sl.plot.response(found)
     """
     if isinstance(vibration, FrequencyResponse):
-        curves, modes = ResponseCurves.of_response(vibration, force, motion), []
+        curves, modes = ResponseCurves(vibration, force, motion), []
     else:
         curves = ResponseCurves.of_vibration(vibration, force, motion)
         modes = list(zip(vibration.frequency, vibration.platform_share, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Final, NamedTuple, TypeAlias
+from typing import ClassVar, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -229,14 +229,29 @@ BESIDE = 0.03  # range of these frequencies, divided by the frequency of the pea
 BELOW = 6.0  # ratio of the lowest mode frequency to the start of the curves
 
 
-class ResponseCurves(NamedTuple):
-    """Response curves with and without cable mass, for the same force."""
+class ResponseCurves:
+    """Response curves with and without cable mass, for the same force.
 
-    frequency: Array  # [Hz], ascending, shape (F,)
-    with_mass: Array  # amplitude of motion per force, with cable mass, in `unit`, shape (F,)
-    massless: Array  # amplitude with massless cables, shape (F,)
-    static: float  # motion per static force
-    unit: str  # unit of all responses
+    Attributes:
+        frequency: Frequencies [Hz], ascending, shape (F,).
+        with_mass: Amplitude of motion per force, with cable mass, in `unit`, shape (F,).
+        massless: Amplitude with massless cables, shape (F,).
+        static: Motion per static force.
+        unit: Unit of all responses.
+    """
+
+    def __init__(self, response: FrequencyResponse, force: str = "x", motion: str | None = None) -> None:
+        """Curves of one element of a `FrequencyResponse`, within the range of logarithmic axes."""
+        row, column = _places(force, motion)
+        answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
+        kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
+        kept = kept[np.argsort(response.frequency[kept], kind="stable")]
+        if len(kept) < 2:
+            step = "Give more frequencies, for instance np.geomspace(0.5, 20.0, 500)."
+            raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "at least two", step)
+        self.static = abs(float(stiffness(response.state).compliance[row, column]))
+        self.frequency, self.unit = locked(response.frequency[kept]), UNITS[row > 2, column > 2]
+        self.with_mass, self.massless = (locked(receptance[kept]) for receptance in answers)
 
     @classmethod
     def of_vibration(cls, vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
@@ -251,21 +266,7 @@ class ResponseCurves(NamedTuple):
         _places(force, motion)
         natural = np.concatenate((vibration.frequency, modes(state).frequency))
         found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)
-        return cls.of_response(found, force, motion)
-
-    @classmethod
-    def of_response(cls, response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
-        """Curves of one element of a `FrequencyResponse`, within the range of logarithmic axes."""
-        row, column = _places(force, motion)
-        answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
-        kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
-        kept = kept[np.argsort(response.frequency[kept], kind="stable")]
-        if len(kept) < 2:
-            step = "Give more frequencies, for instance np.geomspace(0.5, 20.0, 500)."
-            raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "at least two", step)
-        static = abs(float(stiffness(response.state).compliance[row, column]))
-        with_mass, massless = (locked(receptance[kept]) for receptance in answers)
-        return cls(locked(response.frequency[kept]), with_mass, massless, static, UNITS[row > 2, column > 2])
+        return cls(found, force, motion)
 
 
 def _places(force: str, motion: str | None) -> tuple[int, int]:
