@@ -46,7 +46,7 @@ def test_slopes_are_those_of_the_equilibrium(name: str) -> None:
     size = sl.modes(sl.forward(robot, lengths, pose).state).frequency.shape[1]
     wanted = np.zeros((len(rows), size))
     by_values, by_length = unwhitened_slopes(
-        MachineTerms.of(robot, sl.Catenary(), asked, sensors), rows, lengths, frequencies=wanted
+        MachineTerms(robot, sl.Catenary(), asked, sensors), rows, lengths, frequencies=wanted
     )
 
     def frequencies(changed: sl.Robot, lengths: Array) -> Array:

@@ -180,7 +180,7 @@ def triangle_of(case: Case) -> Array:
         read = given or (sensors if case.positions in (0, POSES) else sensors.replace(position_deviation=None))
         if len(lengths[part]):
             rows = predicted_rows(
-                MachineTerms.of(machine.robot, sl.Catenary(), parameters, read), pose_rows(pose[part]), lengths[part]
+                MachineTerms(machine.robot, sl.Catenary(), parameters, read), pose_rows(pose[part]), lengths[part]
             )
             triangle = append_rows(triangle, rows.matrix)
     return triangle

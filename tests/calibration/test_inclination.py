@@ -39,7 +39,7 @@ def test_slopes_are_rotations_about_the_horizontal_axes_of_the_world() -> None:
     for kind, row in COLUMNS:
         asked = reference.parameters(machine, (kind,))
         seen = predicted_rows(
-            MachineTerms.of(machine.robot, sl.Catenary(), asked, level), reference.pose_rows(pose), lengths
+            MachineTerms(machine.robot, sl.Catenary(), asked, level), reference.pose_rows(pose), lengths
         )
         found = seen.matrix[:, -3:, asked.where[row, 0]] * [2e-3, 3e-3, 1.0]
         turned = reference.slopes(machine, pose, lengths, row, 0)[:, -3:] @ machine.sensors.frame.matrix.T
@@ -52,7 +52,7 @@ def test_residuals_turn_the_predicted_into_the_measured_vertical() -> None:
     level = machine.sensors.replace(rotation_deviation=[2e-3, 3e-3, np.inf])
     read = Rotation.from_euler("ZYX", [[2.5, 0.2, -0.1], [-3.0, -0.15, 0.25]])
     asked = reference.parameters(machine, ("mass",))
-    terms = MachineTerms.of(machine.robot, sl.Catenary(), asked, level, np.zeros(8))
+    terms = MachineTerms(machine.robot, sl.Catenary(), asked, level, np.zeros(8))
     none = np.full((2, 3), np.nan)
     readings = Readings(lengths, np.full(lengths.shape, np.nan), none, read.as_quat())
     rows = whitened_rows(terms, readings, terms.winch_slopes(lengths), reference.pose_rows(pose), lengths)

@@ -60,7 +60,7 @@ def observed_slopes(name: str, kind: str) -> Array:
     machine, pose, lengths = machine_at_poses(name)
     asked = reference.parameters(machine, (kind,))
     seen = predicted_rows(
-        MachineTerms.of(machine.robot, sl.Catenary(), asked, machine.sensors, machine.offset), pose_rows(pose), lengths
+        MachineTerms(machine.robot, sl.Catenary(), asked, machine.sensors, machine.offset), pose_rows(pose), lengths
     )
     assert not seen.misfit.any()
     found: Array = seen.matrix * deviations(machine)[:, None]
@@ -120,7 +120,7 @@ def test_whitening_by_errors_of_lengths(robot: str) -> None:
     machine, pose, lengths = machine_at_poses(robot)
     loose = machine.sensors.replace(length_deviation=LENGTH)
     asked = reference.parameters(machine, ("frame_anchors", "mass"))
-    seen = predicted_rows(MachineTerms.of(machine.robot, sl.Catenary(), asked, loose), pose_rows(pose), lengths)
+    seen = predicted_rows(MachineTerms(machine.robot, sl.Catenary(), asked, loose), pose_rows(pose), lengths)
     by_lengths = reference.by_lengths(machine, pose, lengths, sl.Catenary())
     scatter = np.diag(deviations(machine) ** 2) + LENGTH**2 * by_lengths @ np.swapaxes(by_lengths, -1, -2)
     slopes = np.concatenate((differences(robot, "frame_anchors"), differences(robot, "mass")), axis=-1)
@@ -136,7 +136,7 @@ def test_a_missing_sensor_has_no_slopes(robot: str, absent: str) -> None:
     rows = {"tension_deviation": slice(0, 8), "position_deviation": slice(8, 11), "rotation_deviation": slice(11, 14)}
     without = machine.sensors.replace(**{absent: None}, length_deviation=LENGTH)
     asked = reference.parameters(machine, ("frame_anchors", "measuring_frame", "target"))
-    seen = predicted_rows(MachineTerms.of(machine.robot, sl.Catenary(), asked, without), pose_rows(pose), lengths)
+    seen = predicted_rows(MachineTerms(machine.robot, sl.Catenary(), asked, without), pose_rows(pose), lengths)
     by_lengths = reference.by_lengths(machine, pose, lengths, sl.Catenary())
     there = np.delete(np.arange(14), rows[absent])
     kinds = ("frame_anchors", "measuring_frame", "target")
@@ -154,7 +154,7 @@ def test_a_missing_sensor_has_no_slopes(robot: str, absent: str) -> None:
 def test_slopes_of_a_common_parameter_are_sums_over_cables(kind: str) -> None:
     machine, pose, lengths = machine_at_poses("layers")
     asked = reference.parameters(machine, (kind,), shared=(kind,))
-    terms = MachineTerms.of(machine.robot, sl.Catenary(), asked, machine.sensors)
+    terms = MachineTerms(machine.robot, sl.Catenary(), asked, machine.sensors)
     seen = predicted_rows(terms, pose_rows(pose), lengths)
     each = observed_slopes("layers", kind)
     wanted = each.reshape(*each.shape[:2], 8, -1).sum(axis=2)

@@ -39,7 +39,7 @@ def information_of(plan: sl.CalibrationPoses, pose: sl.Pose, lengths: Array) -> 
     numbers = plan.parameters
     unit = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
     matrix = predicted_rows(
-        MachineTerms.of(plan.robot, sl.Catenary(), numbers, plan.sensors), pose_rows(pose), lengths
+        MachineTerms(plan.robot, sl.Catenary(), numbers, plan.sensors), pose_rows(pose), lengths
     ).matrix
     flat = (matrix * unit).reshape(-1, len(unit))
     found: Array = flat.T @ flat
@@ -329,7 +329,7 @@ def _errors_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown]) -> Array:
     rows = pose_rows(plan.poses)
     matrix = (
         predicted_rows(
-            MachineTerms.of(plan.robot, sl.Catenary(), numbers, plan.sensors), rows, plan.unstrained_length
+            MachineTerms(plan.robot, sl.Catenary(), numbers, plan.sensors), rows, plan.unstrained_length
         ).matrix
         / unit
     )

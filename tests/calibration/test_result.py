@@ -216,7 +216,7 @@ def test_the_effect_of_stiffness_differs_between_counts_and_lengths(counted: boo
     plan = sl.inverse(robot, commanded("drums")[0])
     lengths = np.asarray(plan.state.unstrained_length)[None]
     by_values, _ = _motion_slopes(
-        MachineTerms.of(robot, sl.Catenary(), parameters, sl.Sensors()), pose_rows(plan.state.pose), lengths
+        MachineTerms(robot, sl.Catenary(), parameters, sl.Sensors()), pose_rows(plan.state.pose), lengths
     )
     moved = by_values[0, :3]
     believed = counts_of(robot, lengths)

@@ -56,7 +56,7 @@ def test_slopes_are_those_of_the_equilibrium(name: str) -> None:
     kinds += ["swivel_zero", "pulley_radius", "dead_cable"] if robot.winches is not None else ["swivel_zero"]
     asked = parameters_of(robot, kinds, sensors, counted=False)
     rows, m = reference.pose_rows(pose), robot.cable_count
-    by_values, by_length = unwhitened_slopes(MachineTerms.of(robot, sl.Catenary(), asked, sensors), rows, lengths)
+    by_values, by_length = unwhitened_slopes(MachineTerms(robot, sl.Catenary(), asked, sensors), rows, lengths)
     for k, label in enumerate(asked.labels):
         if label.endswith((".y", "[3].x")) or "[" not in label:
             step = 1e-5 * np.eye(len(asked.prior))[k] * (asked.prior[k] if asked.logarithmic[k] else 1.0)

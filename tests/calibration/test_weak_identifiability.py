@@ -34,7 +34,7 @@ def identified(robot: str, unknowns: tuple[str, ...], *, positions: bool = False
     shared = tuple(name for name in unknowns if name in ("pulley_radius", "axial_stiffness", "linear_density"))
     parameters = reference.parameters(machine, unknowns, shared=shared)
     matrix = predicted_rows(
-        MachineTerms.of(machine.robot, sl.Catenary(), parameters, sensors), pose_rows(pose), lengths
+        MachineTerms(machine.robot, sl.Catenary(), parameters, sensors), pose_rows(pose), lengths
     ).matrix
     triangle = append_rows(np.zeros((0, len(parameters.names))), matrix)
     gauge = gauge_of(triangle, parameters, parameters.prior, machine.robot, sensors)

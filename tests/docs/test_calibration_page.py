@@ -67,7 +67,7 @@ def slopes(unknowns: tuple[str, ...]) -> tuple[Array, tuple[str, ...]]:
     for way in ways:
         plan = sl.inverse(drawn, poses[:20], tension=way)
         said = predicted_rows(
-            MachineTerms.of(drawn, sl.Catenary(), numbers, SENSORS), pose_rows(poses[:20]), plan.unstrained_length
+            MachineTerms(drawn, sl.Catenary(), numbers, SENSORS), pose_rows(poses[:20]), plan.unstrained_length
         )
         rows.append(said.matrix.reshape(-1, len(numbers.names)))
     return np.concatenate(rows), numbers.names

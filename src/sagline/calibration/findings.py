@@ -268,13 +268,13 @@ def _linear_problem(found: Findings, used: Indices, stated: Array) -> tuple[Arra
     root *= np.sqrt(len(used) / len(found.rows))  # the prior information per pose is the same as in the whole log
     if found.model.code == codes.STRAIGHT:
         numbers = found.length_offset, parameters.of_cables(found.values, kinds.SCALE, 1.0)
-        machine = MachineTerms.of(found.robot, found.model, parameters, found.sensors, *numbers)
+        machine = MachineTerms(found.robot, found.model, parameters, found.sensors, *numbers)
         slopes = machine.winch_slopes(lengths)
         rows, noise, misfit = whitened_errors(machine, slopes, pose_rows(found.poses)[used], found.residuals[used])
         return rows * scale, noise, misfit + rows * scale @ step, root
     residuals = found.residuals[used]
     modes = count_of_frequencies(found.sensors, m, residuals.shape[1])
-    machine = MachineTerms.of(found.robot, found.model, parameters, found.sensors)
+    machine = MachineTerms(found.robot, found.model, parameters, found.sensors)
     frequencies = residuals[:, residuals.shape[1] - modes :] if modes else None
     by_values, by_length = unwhitened_slopes(machine, pose_rows(found.poses)[used], lengths, frequencies)
     read = ~np.isnan(residuals[:, m:])

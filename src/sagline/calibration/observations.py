@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -118,27 +119,28 @@ def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
     )
 
 
-class MachineTerms(NamedTuple):
-    """A robot with parameter values and its sensors, as arrays for the kernel."""
+class MachineTerms:
+    """A robot with parameter values and its sensors, as arrays for the kernel.
 
-    model: CableModel
-    parameters: Parameters
-    robot: Robot  # the robot with the parameter values
-    sensors: Sensors
-    offset: Array  # offset of reported lengths [m], (m,)
-    scale: Array  # scale of reported lengths, (m,)
-    late: Array  # times by which the reported lengths are late [s], (m,)
-    swivel_zero: Array  # readings of swivel angles of cables along x [rad], (m,)
-    drums: Drums | None  # drums if counts are read; else None
-    terms: ForwardTerms  # cable model in the form of the kernel
-    body: Array  # body_table
-    cables: Array  # cable_table
-    sensing: SensingArrays  # sensors in the form of the kernel
-    slopes: Array  # derivatives of the values by the internal parameters, (P,)
+    Attributes:
+        model: Cable model.
+        parameters: Unknowns.
+        robot: The robot with the parameter values.
+        sensors: The sensors.
+        offset: Offset of reported lengths [m], (m,).
+        scale: Scale of reported lengths, (m,).
+        late: Times by which the reported lengths are late [s], (m,).
+        swivel_zero: Readings of swivel angles of cables along x [rad], (m,).
+        drums: Drums if counts are read; else None.
+        terms: Cable model in the form of the kernel.
+        body: `body_table`.
+        cables: `cable_table`.
+        sensing: Sensors in the form of the kernel.
+        slopes: Derivatives of the values by the internal parameters, (P,).
+    """
 
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         robot: Robot,
         model: CableModel,
         parameters: Parameters,
@@ -147,40 +149,40 @@ class MachineTerms(NamedTuple):
         scale: Array | float = 1.0,
         late: Array | float = 0.0,
         swivel_zero: Array | float = 0.0,
-    ) -> MachineTerms:
+    ) -> None:
         """Arrays of a robot and its sensors; raises an error if counts need drum data that are missing."""
         refuse_slanted(robot, only_platform=True)
-        machine = cls(
-            model,
-            parameters,
-            robot,
-            sensors,
-            np.broadcast_to(offset, robot.cable_count),
-            np.broadcast_to(scale, robot.cable_count),
-            np.broadcast_to(late, robot.cable_count),
-            np.broadcast_to(swivel_zero, robot.cable_count),
-            Drums(robot) if parameters.counted else None,
-            (model.code, *model.parameters, has_routing(robot) or None),
-            body_table(robot),
-            cable_table(robot, slanted=True),
-            _sensor_arrays(robot, sensors),
-            np.zeros(0),
-        )
-        return machine.with_parameters(parameters)
+        self.robot, self.model, given = robot, model, (offset, scale, late, swivel_zero)
+        self.offset, self.scale, self.late, self.swivel_zero = (np.broadcast_to(x, robot.cable_count) for x in given)
+        self.drums = Drums(robot) if parameters.counted else None
+        self.terms: ForwardTerms = (model.code, *model.parameters, has_routing(robot) or None)
+        self.body, self.cables = body_table(robot), cable_table(robot, slanted=True)
+        self._take_sensors(sensors)
+        self._take_parameters(parameters)
 
     def with_parameters(self, parameters: Parameters) -> MachineTerms:
-        """The machine with other unknowns. Unknown pulley radii and dead lengths need routing, even if zero."""
+        """The machine with other unknowns."""
+        other = copy(self)
+        other._take_parameters(parameters)
+        return other
+
+    def _take_parameters(self, parameters: Parameters) -> None:
+        """Store the unknowns. Unknown pulley radii and dead lengths need routing, even if zero."""
         routed = self.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
-        terms, cables, winches = (*self.terms[:-1], routed or None), self.cables, self.robot.winches
-        radii, plain = (parameters.where[kinds.RADIUS] >= 0).any(), cables.shape[2] == tables.CABLE_COLUMNS
+        self.terms, winches = (*self.terms[:-1], routed or None), self.robot.winches
+        radii, plain = (parameters.where[kinds.RADIUS] >= 0).any(), self.cables.shape[2] == tables.CABLE_COLUMNS
         if radii and plain and winches is not None and winches.swivel_axis[:, :2].any():
-            cables = locked(slanted_rows(self.robot)[None])  # eyelets that may become pulleys
-        slopes = slopes_of_values(self.robot, parameters)
-        return self._replace(parameters=parameters, terms=terms, cables=cables, slopes=slopes)
+            self.cables = locked(slanted_rows(self.robot)[None])  # eyelets that may become pulleys
+        self.parameters, self.slopes = parameters, slopes_of_values(self.robot, parameters)
 
     def with_sensors(self, sensors: Sensors) -> MachineTerms:
         """The machine with other sensors."""
-        return self._replace(sensors=sensors, sensing=_sensor_arrays(self.robot, sensors))
+        other = copy(self)
+        other._take_sensors(sensors)
+        return other
+
+    def _take_sensors(self, sensors: Sensors) -> None:
+        self.sensors, self.sensing = sensors, _sensor_arrays(self.robot, sensors)
 
     def with_unit_sensors(self) -> MachineTerms:
         """The machine with exact lengths; its other sensors have standard deviations of 1 in SI units."""
@@ -253,7 +255,8 @@ def _with_further(
     m, sensors, where = lengths.shape[1], machine.sensors, machine.parameters.where.copy()
     where[kinds.SHIFT : kinds.SCALE] = -1  # the measuring system does not move the platform
     parameters = replace(machine.parameters, where=locked(where))
-    plain = machine.with_sensors(POSE_SENSORS)._replace(parameters=parameters)
+    plain = machine.with_sensors(POSE_SENSORS)
+    plain.parameters = parameters
     moves = _observed(plain, _no_readings(lengths), slopes, poses, lengths, direction)
     motion = moves.matrix[:, m:], np.swapaxes(moves.back, 1, 2)[:, m:] / EXACT**2
     factor = machine.slopes if direction is None else machine.slopes * direction

@@ -234,7 +234,7 @@ def calibration_poses(
         8.0 * 3.0 * tried * (robot.cable_count + 6) * len(parameters.names),
         "Ask for fewer candidates.",
     )
-    machine = MachineTerms.of(robot, _CATENARY, parameters, read)
+    machine = MachineTerms(robot, _CATENARY, parameters, read)
     scale, held = _scale(parameters, machine.slopes)
     rows = predicted_rows(machine, standing.poses, standing.lengths).matrix * scale
     stable = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))

@@ -86,7 +86,7 @@ class FitProblem(NamedTuple):
         robot, sensors = with_values(self.robot, parameters, values), sensors_with(self.sensors, parameters, values)
         offset, scale = parameters.length_offset(values), parameters.of_cables(values, kinds.SCALE, 1.0)
         late, turned = (parameters.of_cables(values, row, 0.0) for row in (kinds.CLOCK, kinds.SWIVEL))
-        return MachineTerms.of(robot, self.model, parameters, sensors, offset, scale, late, turned)
+        return MachineTerms(robot, self.model, parameters, sensors, offset, scale, late, turned)
 
     def reported_lengths(self, machine: MachineTerms, part: slice = slice(None)) -> Array:
         """Lengths (n, m) [m] that the winches report at the poses `part`."""
@@ -147,7 +147,7 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     # tensions, because an anchor error of one millimeter changes the tension of a steel cable by about 90 N.
     numbers = problem.prior
     offset = problem.parameters.length_offset(problem.parameters.prior)
-    machine = MachineTerms.of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
+    machine = MachineTerms(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
     reported = problem.reported_lengths(machine)
     poses = _poses(problem, machine, reported, commanded)
     if problem.straight:

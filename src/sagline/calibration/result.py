@@ -231,7 +231,7 @@ class Calibration(Findings, Saved):
 
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
         reported = self.length_offset, self.length_scale
-        machine = MachineTerms.of(self.robot, self.model, self.parameters, Sensors(), *reported)
+        machine = MachineTerms(self.robot, self.model, self.parameters, Sensors(), *reported)
         return _motion_slopes(machine, poses, lengths)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:

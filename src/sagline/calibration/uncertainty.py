@@ -36,7 +36,7 @@ def uncertainty_of(plan: Plan) -> Uncertainty:
     errors = _known_errors(robot)
     robot = robot.replace(tolerances=errors, winches=(robot.winches or Winch()).replace(load_cell_gain=1.0))
     parameters = _parameters(robot, errors)
-    machine = MachineTerms.of(robot, state.cables.model, parameters, Sensors())
+    machine = MachineTerms(robot, state.cables.model, parameters, Sensors())
     names = np.array(parameters.names)
     part_of = np.stack([names == name for name in errors], axis=-1).astype(np.float64)  # (P, K)
     solved, shape = np.atleast_1d(plan.solved), plan.status.shape
