@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -132,12 +133,9 @@ class MarginRows:
 def _measured(given: _Given, rows: Array, progress: Progress | None = None) -> Bracket:
     """Margins at the poses `rows` (N, 7) from the arguments of the kernel."""
     count, (freedom, _bodies, table) = len(rows), given[2]
-    numbers, counters = memory_for(table.shape[1])
-    memory = (
-        np.empty(2 * numbers.size + margin_memory(len(freedom), table.shape[1])),
-        np.empty(2 * counters.size, dtype=np.int64),
-        np.empty(table.shape[1], dtype=np.int8),
-    )
+    m = table.shape[1]
+    numbers, counters = _memory_sizes(len(freedom), m)
+    memory = np.empty(numbers), np.empty(counters, dtype=np.int64), np.empty(m, dtype=np.int8)
     margins = (
         np.empty((3, count)),
         np.empty((count, 6)),
@@ -152,6 +150,13 @@ def _measured(given: _Given, rows: Array, progress: Progress | None = None) -> B
             signed_margins(*arguments, part.start, part.stop)
     values, directions, limiting, statuses = margins
     return Bracket(values[0], values[1], values[2], limiting, statuses, directions)
+
+
+@lru_cache(maxsize=64)
+def _memory_sizes(n: int, m: int) -> tuple[int, int]:
+    """Sizes of the work arrays of the kernel for n free motions and m cables: numbers and counters."""
+    numbers, counters = memory_for(m)
+    return 2 * numbers.size + margin_memory(n, m), 2 * counters.size
 
 
 def _each(array: Array, count: int) -> Array:
