@@ -10,8 +10,8 @@ from sagline import structure_matrix
 from sagline.dynamics.trajectories.profiles import (
     ForceBalance,
     HalfPlanes,
-    JerkProfile,
-    SpeedProfile,
+    fastest_with_jerk,
+    fastest_within,
 )
 from sagline.dynamics.trajectories.segments import segments_of
 from tests.refusal import refused
@@ -228,16 +228,16 @@ def test_profiles_of_constant_bounds_are_known() -> None:
         every = np.repeat(np.array(rows)[None], len(place), axis=0)
         return HalfPlanes(every[..., :2], every[..., 2])
 
-    bang = SpeedProfile.fastest(place, planes((1.0, 0.0, a), (-1.0, 0.0, a)))
+    bang = fastest_within(place, planes((1.0, 0.0, a), (-1.0, 0.0, a)))
     assert bang is not None
-    assert bang.duration == pytest.approx(2.0 / np.sqrt(a), rel=1e-12)
-    held = SpeedProfile.fastest(place, planes((1.0, 0.0, a), (-1.0, 0.0, b), (0.0, 1.0, v**2)))
+    assert bang.x[-1] == pytest.approx(2.0 / np.sqrt(a), rel=1e-12)
+    held = fastest_within(place, planes((1.0, 0.0, a), (-1.0, 0.0, b), (0.0, 1.0, v**2)))
     assert held is not None
     expected = 1.0 / v + 0.5 * v * (1.0 / a + 1.0 / b)  # two ramps and a part at full speed
-    assert held.duration == pytest.approx(expected, rel=2e-3)  # the ramps end between grid points
-    assert SpeedProfile.fastest(place, planes((-1.0, 0.0, -1.0))) is None  # only acceleration is possible
-    time = np.linspace(0.0, bang.duration, 9)
-    np.testing.assert_allclose(bang.at(time)[0, :5], 0.5 * a * time[:5] ** 2, rtol=1e-12)
+    assert held.x[-1] == pytest.approx(expected, rel=2e-3)  # the ramps end between grid points
+    assert fastest_within(place, planes((-1.0, 0.0, -1.0))) is None  # only acceleration is possible
+    time = np.linspace(0.0, bang.x[-1], 9)
+    np.testing.assert_allclose(bang(time[:5]), 0.5 * a * time[:5] ** 2, rtol=1e-12)
 
 
 @pytest.mark.parametrize("jerk", wide([None, 100.0]))
@@ -305,11 +305,11 @@ def test_bounds_hold_at_both_ends_of_every_step() -> None:
         planes = HalfPlanes(
             np.hstack((normals, box)), np.full((len(place), 11), 1.0) * [*rng.uniform(0.5, 2.0, 9), 5, 5]
         )
-        profile = SpeedProfile.fastest(place, planes)
+        profile = fastest_within(place, planes)
         assert profile is not None
         for k in range(len(place) - 1):
             for end in (k, k + 1):
-                point = np.array([profile.motion[k, 0], profile.square[end]])
+                point = np.array([profile(profile.x[k], 2), profile(profile.x[end], 1) ** 2])
                 assert (planes.rates[end] @ point <= planes.bound[end] + 1e-9).all()
 
 
@@ -319,7 +319,7 @@ def test_a_forced_deceleration_requires_an_entry_speed() -> None:
     for most, possible in ((0.5, False), (1.5, True)):
         up = np.where(place < 0.5, most, -1.0)
         rates = np.broadcast_to([[1.0, 0.0], [-1.0, 0.0]], (101, 2, 2))
-        profile = SpeedProfile.fastest(place, HalfPlanes(rates.copy(), np.stack((up, np.full(101, 8.0)), axis=1)))
+        profile = fastest_within(place, HalfPlanes(rates.copy(), np.stack((up, np.full(101, 8.0)), axis=1)))
         assert (profile is not None) == possible
 
 
@@ -332,9 +332,9 @@ def test_the_jerk_on_a_curve_ends_within_its_limit(cogiro: sl.Robot) -> None:
     def free(parameter: np.ndarray) -> HalfPlanes:
         return HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
 
-    course = JerkProfile.fastest(move.curve, robot, free, (20.0, np.inf), 0.5)
+    course = fastest_with_jerk(move.curve, robot, free, (20.0, np.inf), 0.5)
     assert course is not None
-    motion = course.at(np.linspace(0.0, course.duration, 2001))
+    motion = np.stack([course(np.linspace(0.0, course.x[-1], 2001), order) for order in range(4)])
     jerk = np.linalg.norm(move.curve.at(motion[0]).twists(motion)[2, :, :3], axis=1)
     assert np.sort(jerk)[-20] == pytest.approx(20.0, rel=5e-3)
     assert jerk.max() < 20.0 * 1.005

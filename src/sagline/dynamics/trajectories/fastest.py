@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from sagline.robot.drum import drum_lever
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
 
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
 _PLACES: Final = 201  # number of positions along a segment at which limits are evaluated
 _ITERATIONS: Final = 8  # largest number of iterations for the sag forces
 _CONVERGED: Final = 1e-7  # the iterations stop at a smaller relative change of the time
@@ -29,11 +32,6 @@ _SLOWER: Final = 1e-6
 _TRIES: Final = 12
 _GENTLE: Final = 8  # number of initial attempts; each multiplies the time by the cube root of the excess speed
 _ROUNDING: Final = 1e-12
-
-
-_Motion: TypeAlias = tuple[
-    profiles.SpeedProfile | profiles.JerkProfile, float
-]  # motion of a segment, and factor of its duration
 
 
 def fastest(
@@ -92,7 +90,7 @@ def fastest(
     )
     callback(progress, "progress")
     segments = segments_of(path)
-    motions: list[_Motion | None] = []
+    motions: list[PPoly | None] = []
     for k, segment in enumerate(segments):
         motions.append(None if segment.curve is None else _fastest_motion(inner, segment, segment.curve, limits))
         if progress is not None:
@@ -108,22 +106,21 @@ def fastest(
             slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
         if slower == 1.0:
             return new
-        motions = [None if motion is None else (motion[0], motion[1] * slower) for motion in motions]
+        motions = [None if motion is None else profiles.slower(motion, slower) for motion in motions]
     raise _infeasible_error(f"of {len(segments)} moves", plan)
 
 
-def _timed(segment: RestToRestSegment, motion: _Motion | None) -> RestToRestSegment:
+def _timed(segment: RestToRestSegment, motion: PPoly | None) -> RestToRestSegment:
     """The segment with a new motion; None for a segment at rest, which is unchanged."""
     if motion is None:
         return segment
-    profile, slower = motion
 
     def rates(time: Array) -> Array:
-        values = profile.at(np.clip(time / slower, 0.0, profile.duration)) / slower ** np.arange(4)[:, None]
+        values = np.stack([motion(np.clip(time, 0.0, motion.x[-1]), order) for order in range(4)])
         values[0] = np.clip(values[0], 0.0, 1.0)
         return values
 
-    return replace(segment, duration=profile.duration * slower, rates=rates)
+    return replace(segment, duration=float(motion.x[-1]), rates=rates)
 
 
 def _with_margin(robot: Robot, margin: float) -> Robot:
@@ -135,7 +132,7 @@ def _with_margin(robot: Robot, margin: float) -> Robot:
     return robot.replace(tension_min=low, tension_max=high)
 
 
-def _fastest_motion(robot: Robot, segment: RestToRestSegment, curve: Curve, limits: tuple[float, float]) -> _Motion:
+def _fastest_motion(robot: Robot, segment: RestToRestSegment, curve: Curve, limits: tuple[float, float]) -> PPoly:
     """Fastest motion along one segment within the robot's limits."""
     where = f"from {segment.begin:g} s to {segment.begin + segment.duration:g} s"
     place = np.linspace(0.0, 1.0, _PLACES)
@@ -146,32 +143,26 @@ def _fastest_motion(robot: Robot, segment: RestToRestSegment, curve: Curve, limi
     balances, speeds = profiles.ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
     bounds, least = speeds(place), np.inf
     for _ in range(_ITERATIONS):
-        profile = profiles.SpeedProfile.fastest(place, balances.half_planes().joined(bounds))
-        if profile is None:
+        motion = profiles.fastest_within(place, balances.half_planes().joined(bounds))
+        if motion is None:
             raise _infeasible_error(f"{where} in motion", rest)
-        before, least = least, profile.duration
+        before, least = least, float(motion.x[-1])
         if abs(least - before) <= _CONVERGED * least:
             break
-        balances = balances.near_motion(profile.motion)
-    motion: profiles.SpeedProfile | profiles.JerkProfile | None = profile
+        balances = balances.near_motion(np.stack((motion(motion.x, 2), motion(motion.x, 1) ** 2), axis=1))
     if np.isfinite(limits).any():
-        motion = profiles.JerkProfile.fastest(curve, robot, speeds, limits, least)
+        motion = profiles.fastest_with_jerk(curve, robot, speeds, limits, least)
     if motion is None:
         raise _infeasible_error(f"{where} in motion", rest)
-    return motion, _factor(robot, segment, curve, motion, limits)
+    return _within_limits(robot, segment, curve, motion, limits)
 
 
-def _factor(
-    robot: Robot,
-    segment: RestToRestSegment,
-    curve: Curve,
-    motion: profiles.SpeedProfile | profiles.JerkProfile,
-    limits: tuple[float, float],
-) -> float:
-    """Factor >= 1 of the duration, with which `motion` violates no limit between the positions."""
-    factor = 1.0
+def _within_limits(
+    robot: Robot, segment: RestToRestSegment, curve: Curve, motion: PPoly, limits: tuple[float, float]
+) -> PPoly:
+    """The motion `motion`, slower if necessary, so that it violates no limit between the positions."""
     for again in range(_TRIES):
-        timed = _timed(segment, (motion, factor))
+        timed = _timed(segment, motion)
         values = timed.rates(np.linspace(0.0, timed.duration, _INSTANTS))
         jet = curve.at(values[0])
         twists = jet.twists(values)
@@ -179,10 +170,10 @@ def _factor(
         sizes = (np.linalg.norm(twists[2][:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
         slower = max(1.0, *(np.cbrt(size / limit) for size, limit in zip(sizes, limits, strict=True)))
         if plan.solved.all() and slower <= 1.0 + _ROUNDING:
-            return factor
+            return motion
         if not plan.solved.all():  # the limits hold at rest, and a slower motion changes the tensions less
             slower = max(slower, 1.0 + _SLOWER * 4.0**again)
-        factor *= slower
+        motion = profiles.slower(motion, slower)
     raise _infeasible_error("in motion", plan)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 _NOTHING: Final = 1e-11  # components below this share of the largest component of a direction count as zero
 _BLOCK: Final = 40_000  # matrices per block
@@ -128,57 +131,34 @@ def _normals(matrix: Array) -> Iterator[Array]:
 _FLAT = 1e-12  # rates below this share of the largest rate count as zero
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SpeedProfile:
-    """Motion with constant acceleration of the parameter between neighboring positions."""
+def fastest_within(place: Array, planes: HalfPlanes) -> PPoly | None:
+    """Rest-to-rest motion over the time [s] with the largest feasible speed at each position `place` (K,)."""
+    # The acceleration is constant between neighboring positions. The backward pass computes the squared speeds from
+    # which the end can be reached. The forward pass uses the largest acceleration within these speeds. A bound that is
+    # satisfied at both ends of a step is also satisfied within the step, except for a small error due to the curvature
+    # of the bound. Source: Pham & Pham, A new approach to time-optimal path parameterization based on reachability
+    # analysis, 2018
+    from scipy.interpolate import PPoly  # this import takes longer than the rest of dynamics
 
-    place: Array  # parameters, shape (K,)
-    square: Array  # squared speeds at the parameters, shape (K,)
-    time: Array  # times of the positions [s], shape (K,)
-
-    @classmethod
-    def fastest(cls, place: Array, planes: HalfPlanes) -> SpeedProfile | None:
-        """Rest-to-rest profile with the largest feasible speed at each position `place` (K,)."""
-        # The backward pass computes the squared speeds from which the end can be reached. The forward pass uses the
-        # largest acceleration within these speeds. A bound that is satisfied at both ends of a step is also satisfied
-        # within the step, except for a small error due to the curvature of the bound. Source: Pham & Pham, A new
-        # approach to time-optimal path parameterization based on reachability analysis, 2018
-        steps, last = np.diff(place), len(place) - 1
-        reach = np.zeros((len(place), 2))
-        for i in range(last - 1, -1, -1):
-            reach[i] = _range(*_rows(planes, i, steps[i], reach[i + 1]))
-            if not reach[i, 0] <= reach[i, 1]:
-                return None
-        if reach[0, 0] > 0.0:
+    steps, last = np.diff(place), len(place) - 1
+    reach = np.zeros((len(place), 2))
+    for i in range(last - 1, -1, -1):
+        reach[i] = _range(*_rows(planes, i, steps[i], reach[i + 1]))
+        if not reach[i, 0] <= reach[i, 1]:
             return None
-        square = np.zeros(len(place))
-        for i in range(last):
-            rates, bound = _rows(planes, i, steps[i], reach[i + 1])
-            rising = rates[:, 0] > _FLAT * np.abs(rates[:, 0]).max()
-            most = np.min((bound - rates[:, 1] * square[i])[rising] / rates[rising, 0])
-            square[i + 1] = np.clip(square[i] + 2.0 * steps[i] * most, *reach[i + 1])
-        if not (square[1:-1] > 0.0).all():
-            return None
-        speed = np.sqrt(square)
-        return cls(place, square, np.append(0.0, np.cumsum(2.0 * steps / (speed[1:] + speed[:-1]))))
-
-    @property
-    def duration(self) -> float:
-        """Duration [s]."""
-        return float(self.time[-1])
-
-    @property
-    def motion(self) -> Array:
-        """Acceleration after each position, and squared speed at the position, shape (K, 2)."""
-        rate = 0.5 * np.diff(self.square) / np.diff(self.place)
-        return np.stack((np.append(rate, rate[-1]), self.square), axis=1)
-
-    def at(self, time: Array) -> Array:
-        """Parameter and its first three time derivatives, shape (4, N); the third derivative is 0 within each piece."""
-        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.place) - 2)
-        since, rate, speed = time - self.time[k], self.motion[k, 0], np.sqrt(self.square[k])
-        place = self.place[k] + since * (speed + 0.5 * since * rate)
-        return np.stack((place, speed + since * rate, rate, np.zeros_like(place)))
+    if reach[0, 0] > 0.0:
+        return None
+    square = np.zeros(len(place))
+    for i in range(last):
+        rates, bound = _rows(planes, i, steps[i], reach[i + 1])
+        rising = rates[:, 0] > _FLAT * np.abs(rates[:, 0]).max()
+        most = np.min((bound - rates[:, 1] * square[i])[rising] / rates[rising, 0])
+        square[i + 1] = np.clip(square[i] + 2.0 * steps[i] * most, *reach[i + 1])
+    if not (square[1:-1] > 0.0).all():
+        return None
+    speed = np.sqrt(square)
+    time = np.append(0.0, np.cumsum(2.0 * steps / (speed[1:] + speed[:-1])))
+    return PPoly([0.25 * np.diff(square) / steps, speed[:-1], place[:-1]], time)
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
@@ -217,71 +197,55 @@ _TINY: Final = 1e-30
 _SIDES: Final = 32  # number of directions in which a polygon's border is sampled
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JerkProfile:
-    """Motion with constant jerk of the parameter on each of P equally long pieces."""
+def fastest_with_jerk(
+    curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
+) -> PPoly | None:
+    """The fastest rest-to-rest motion over the time [s] that was found within tension limits and jerk bounds."""
+    # The problem is linear in the jerk and in the squared time, except for three quantities: the position at each
+    # share of the time, the squared speed at this position, and the third power of the time. Each iteration updates
+    # these quantities and solves a linear program. Units: limits [m/s^3]; least [s]
+    from scipy.interpolate import PPoly
+    from scipy.optimize import linprog
 
-    jerk: Array  # third derivative of the parameter with respect to normalized time, shape (P,)
-    duration: float  # the time [s]
-
-    @classmethod
-    def fastest(
-        cls, curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
-    ) -> JerkProfile | None:
-        """The fastest rest-to-rest profile that was found within tension limits and jerk bounds."""
-        # The problem is linear in the jerk and in the squared time, except for three quantities: the position at each
-        # share of the time, the squared speed at this position, and the third power of the time. Each iteration updates
-        # these quantities and solves a linear program. Units: limits [m/s^3]; least [s]
-        from scipy.optimize import linprog  # this import takes longer than the rest of dynamics
-
-        course = _first(curve, limits, least)
-        state = _integration_matrices(PIECES)
-        jet = curve.at(np.clip(state[0] @ course.jerk, 0.0, 1.0))
-        balances = ForceBalance.at(robot, jet, inverse(robot, jet.pose))
-        ends = np.hstack((state[:, -1], np.zeros((3, 1))))
-        cost = np.append(np.zeros(PIECES), 1.0)
-        for _ in range(_ITERATIONS):
-            place, speed, rate = state @ course.jerk
-            square = course.duration**2
-            jet = curve.at(np.clip(place, 0.0, 1.0))
-            balances = balances.at_poses(jet).near_motion(np.stack((rate, speed**2), axis=1) / square)
-            planes = _without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
-            rows, bounds = zip(
-                _within(planes, state, speed),
-                (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # no backward motion
-                *(
-                    _jerk_rows(jet.rates[..., part], state, course, limit)
-                    for part, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True)
-                    if np.isfinite(limit)
-                ),
-                strict=True,
-            )
-            between = [(None, None)] * PIECES + [(0.5 * square, None)]
-            found = linprog(
-                cost, np.vstack(rows), np.concatenate(bounds), ends, [1.0, 0.0, 0.0], between, method="highs"
-            )
-            if found.x is None:
-                return None
-            before, course = course, cls(found.x[:-1], float(np.sqrt(found.x[-1])))
-            if abs(course.duration - before.duration) <= _CONVERGED * course.duration:
-                break
-        return course
-
-    def at(self, time: Array) -> Array:
-        """Parameter and its first three time derivatives, shape (4, N)."""
-        state = _integration_matrices(len(self.jerk)) @ self.jerk  # at the knots
-        scaled = np.clip(time / self.duration, 0.0, 1.0) * len(self.jerk)
-        k = np.minimum(scaled.astype(np.intp), len(self.jerk) - 1)
-        h = (scaled - k) / len(self.jerk)
-        place, speed, rate = state[:, k]
-        jerk = self.jerk[k]
-        values = (
-            place + h * (speed + 0.5 * h * (rate + h / 3.0 * jerk)),
-            speed + h * (rate + 0.5 * h * jerk),
-            rate + h * jerk,
-            jerk,
+    jerk, duration = _first(curve, limits, least)
+    state = _integration_matrices(PIECES)
+    jet = curve.at(np.clip(state[0] @ jerk, 0.0, 1.0))
+    balances = ForceBalance.at(robot, jet, inverse(robot, jet.pose))
+    ends = np.hstack((state[:, -1], np.zeros((3, 1))))
+    cost = np.append(np.zeros(PIECES), 1.0)
+    for _ in range(_ITERATIONS):
+        place, speed, rate = state @ jerk
+        square = duration**2
+        jet = curve.at(np.clip(place, 0.0, 1.0))
+        balances = balances.at_poses(jet).near_motion(np.stack((rate, speed**2), axis=1) / square)
+        planes = _without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
+        rows, bounds = zip(
+            _within(planes, state, speed),
+            (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # no backward motion
+            *(
+                _jerk_rows(jet.rates[..., part], state, jerk, square, limit)
+                for part, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True)
+                if np.isfinite(limit)
+            ),
+            strict=True,
         )
-        return np.stack([value / self.duration**order for order, value in enumerate(values)])
+        between = [(None, None)] * PIECES + [(0.5 * square, None)]
+        found = linprog(cost, np.vstack(rows), np.concatenate(bounds), ends, [1.0, 0.0, 0.0], between, method="highs")
+        if found.x is None:
+            return None
+        jerk, before, duration = found.x[:-1], duration, float(np.sqrt(found.x[-1]))
+        if abs(duration - before) <= _CONVERGED * duration:
+            break
+    place, speed, rate = (values[:-1] for values in state @ jerk)
+    return slower(PPoly([jerk / 6.0, 0.5 * rate, speed, place], np.linspace(0.0, 1.0, PIECES + 1)), duration)
+
+
+def slower(motion: PPoly, factor: float) -> PPoly:
+    """The motion with all times multiplied by `factor`."""
+    from scipy.interpolate import PPoly
+
+    orders = np.arange(len(motion.c))[::-1]
+    return PPoly(motion.c / factor ** orders[:, None], motion.x * factor)
 
 
 def _integration_matrices(pieces: int) -> Array:
@@ -293,8 +257,8 @@ def _integration_matrices(pieces: int) -> Array:
     return np.stack([(since**k - left**k) / f for k, f in ((3, 6.0), (2, 2.0), (1, 1.0))])
 
 
-def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfile:
-    """Initial profile: 5th-degree polynomial, with a time that probably satisfies the limits."""
+def _first(curve: Curve, limits: tuple[float, float], least: float) -> tuple[Array, float]:
+    """Initial jerks (P,) of a 5th-degree polynomial, and a time [s] that probably satisfies the limits."""
     middle = (np.arange(PIECES) + 0.5) / PIECES
     jerk = 60.0 - 360.0 * middle + 360.0 * middle**2
     state = _integration_matrices(PIECES)
@@ -302,7 +266,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfi
     rates = curve.at(state[0] @ jerk).rates[0]
     extents = (np.linalg.norm(rates[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
     times = [np.cbrt(60.0 * extent / limit) for extent, limit in zip(extents, limits, strict=True)]
-    return JerkProfile(jerk, float(max(_SLOWER * least, *times)))
+    return jerk, float(max(_SLOWER * least, *times))
 
 
 def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Array]:
@@ -316,18 +280,17 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
     return rows / size[:, None], right / size
 
 
-def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
+def _jerk_rows(rates: Array, state: Array, jerk: Array, square: float, limit: float) -> tuple[Array, Array]:
     """Rows of the linear program: limits of the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at knots."""
     # directions along the curve, across the curve and along the present jerk limit the magnitude of the final jerk;
     # shapes: rates (3, P + 1, 3)
-    _, speed, rate = (values[:, None] for values in state @ course.jerk)
+    _, speed, rate = (values[:, None] for values in state @ jerk)
     first, second, third = rates
     rest = 3.0 * second * speed * rate + third * speed**3  # present value, which changes little between iterations
     rows, bounds = [], []
-    square = course.duration**2
     for knots in (slice(None, -1), slice(1, None)):  # both ends of each piece
         whole = first[knots][..., None] * np.eye(PIECES)[:, None]
-        now = whole @ course.jerk + rest[knots]
+        now = whole @ jerk + rest[knots]
         along = _unit(first[knots])
         aside = rest[knots] - np.sum(rest[knots] * along, axis=1, keepdims=True) * along
         for direction in (along, -along, _unit(aside), -_unit(aside), _unit(now)):
