@@ -81,6 +81,7 @@ def test_a_log_contains_the_true_poses(tmp_path: Path) -> None:
             watch(machine.time, machine.reading)
             seen.append((machine.time, *machine.reading.position, *machine.reading.quaternion))
     truth = read_log(tmp_path / "twin.mcap").truth
-    found = [(each.time, *each.position, *each.quaternion) for each in truth]
+    began = truth[0][0] - round(1e9 * seen[0][0])
+    found = [(1e-9 * (stamp - began), *position, *quaternion) for stamp, position, quaternion in truth]
     np.testing.assert_allclose(found, seen, atol=1e-6)
     assert abs(seen[-1][3] - seen[0][3]) > 1e-4  # the platform moved in the meantime

@@ -72,6 +72,7 @@ def test_messages_of_a_run_with_a_failing_cell_are_valid(tmp_path: Path) -> None
             assert errors(json.loads(schema.data), value) == [], channel.topic
             found.setdefault(channel.topic, []).append(value)
     assert set(found) == {"/cycle", "/event", "/truth"}
+    assert [each["time"] for each in found["/truth"]] == [machine.time]
     lost = [cycle for cycle in found["/cycle"] if "tension" not in cycle and "partial" in cycle]
     assert len(lost) == sum(cycle["time"] > 1.5 for cycle in found["/cycle"]) > 30
     for cycle in lost:

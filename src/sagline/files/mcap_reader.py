@@ -9,7 +9,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from numpy.typing import NDArray
 
@@ -38,15 +38,6 @@ _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")  # channel, sequence number, two t
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
 
 
-class _Truth(NamedTuple):
-    """True pose of the platform at one time."""
-
-    stamp: int  # time on the log's clock [ns]
-    time: float  # time on the twin's clock [s]
-    position: list[float]  # position [m], three numbers
-    quaternion: list[float]  # quaternion, scalar last, four numbers
-
-
 class LogReader:
     """Reader of a log that may still grow, with the content of the log as far as it has been read."""
 
@@ -61,7 +52,8 @@ class LogReader:
         self.endings: dict[int, tuple[str, str]] = {}
         self.blocks: list[dict[str, NDArray[Any]]] = []  # columns of cycles, for each chunk
         self.events: list[Event] = []  # in order
-        self.truth: list[_Truth] = []  # true poses of the platform, in the log of a twin
+        # true poses of the platform, in the log of a twin: time on the log's clock [ns], position [m], quaternion
+        self.truth: list[tuple[int, list[float], list[float]]] = []
         self.epoch = 0  # zero of the log's clock [ns]
         self.complete = False  # True if the end of the log has been read
         self._offset = self._digest = 0
@@ -189,7 +181,7 @@ class LogReader:
             self.events.append(_event_of(data))
         elif topic == TRUTH:
             said = json.loads(data)
-            self.truth.append(_Truth(stamp, float(said["time"]), said["position"], said["quaternion"]))
+            self.truth.append((stamp, said["position"], said["quaternion"]))
 
     def _damaged(self) -> FileError:
         return FileError(self.path, f"is damaged at byte {self._offset:,}", AGAIN)

@@ -213,10 +213,8 @@ class LogFollower:
         truth = [] if self._truth is None else self._truth.truth
         if not truth:
             return None, None
-        start = truth[0].stamp
-        time = np.array([one.stamp - start for one in truth]) / NANO
-        position, quaternion = (np.array([getattr(one, name) for one in truth]) for name in ("position", "quaternion"))
-        return _interpolated(time, position, quaternion, (stamp - start) / NANO)
+        stamps, position, quaternion = map(np.array, zip(*truth, strict=True))
+        return _interpolated((stamps - stamps[0]) / NANO, position, quaternion, (stamp - stamps[0]) / NANO)
 
 
 def _interpolated(time: Array, position: Array, quaternion: Array, at: Array) -> tuple[Array, Array]:
