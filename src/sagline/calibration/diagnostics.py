@@ -262,12 +262,10 @@ FLAT: Final = 0.05  # points are coplanar if their extent along an axis is below
 
 
 def _aligned(there: Array, measured: Array, *, reflected: bool) -> tuple[Array, float]:
-    """Rotation (3, 3) that aligns `measured` (N, 3) with `there`, and the root mean square distance [m] (Kabsch)."""
-    first, other = there - there.mean(axis=0), measured - measured.mean(axis=0)
-    left, _, right = np.linalg.svd(first.T @ other)
-    sign = np.sign(np.linalg.det(left @ right)) * (-1.0 if reflected else 1.0)
-    matrix = left @ np.diag([1.0, 1.0, sign]) @ right
-    return matrix, float(np.sqrt(np.mean(np.sum((first - other @ matrix.T) ** 2, axis=1))))
+    """Rotation (3, 3) that aligns `measured` (N, 3) with `there`, and the root mean square distance [m]."""
+    sign = -1.0 if reflected else 1.0  # a reflection is a rotation of the points on the other side of their mean
+    rotation, distance = Rotation.align_vectors(there - there.mean(axis=0), sign * (measured - measured.mean(axis=0)))
+    return sign * rotation.as_matrix(), float(distance) / len(there) ** 0.5
 
 
 def _left_handed(there: Array, measured: Array) -> str | None:
