@@ -30,20 +30,14 @@ ChainArrays = tuple[Array, Array, Array, Array, Indices]
 Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes, points
 
 
-class _Chains(NamedTuple):
-    """The chains of m cables or pieces of broken cables, with memory for P nodes each."""
+class _ChainRun(NamedTuple):
+    """State and arrays of a run with m cables or pieces of broken cables, and with memory for P nodes each."""
 
     table: Array  # parameters of the chains, (m, CHAIN_COLUMNS)
     place: Array  # positions of the nodes [m], (m, 3, P)
     speed: Array  # velocities of the nodes [m/s], (m, 3, P)
     pulls: Array  # element forces divided by element lengths [N/m], and work, (m, 4 P)
     counts: Indices  # numbers of free nodes, (m,)
-
-
-class _ChainRun(NamedTuple):
-    """State and arrays of a run; the fields are the arguments of `chains.run_chains`."""
-
-    chains: _Chains
     step: float
     gravity: float
     cables: Array
@@ -81,20 +75,21 @@ def _chain_run_of(
     target_rates, memory = vector(memory, width)
     lengths, wrenches, winds, _anchors = progress.time_tables(courses)
     drives = d.Drives(kind, remembered > 0, data, now, layers, audit)
+    table, place, speed, pulls, counts = chain_arrays
     return _ChainRun(
-        _Chains(*chain_arrays), step, gravity, body[0], body[1], body[2], body[3], drives, lengths, wrenches, winds,
-        state, rows, at, targets, target_rates, small[0], small[1], wind, small[2],
+        table, place, speed, pulls, counts, step, gravity, body[0], body[1], body[2], body[3],
+        drives, lengths, wrenches, winds, state, rows, at, targets, target_rates, small[0], small[1], wind, small[2],
     )  # fmt: skip
 
 
 @glue
 def _fill_last_elements(run: _ChainRun) -> None:
     """Fill the remaining length of the element at the frame, and its rate, for every cable."""
-    for i in range(run.chains.counts.shape[0]):
-        row = run.chains.table[i]
+    for i in range(run.counts.shape[0]):
+        row = run.table[i]
         if row[c.FREE_END] > 0.0:
             continue
-        row[c.REST] = run.rows[g.LENGTH, i] - row[c.BEHIND] - run.chains.counts[i] * row[c.ELEMENT]
+        row[c.REST] = run.rows[g.LENGTH, i] - row[c.BEHIND] - run.counts[i] * row[c.ELEMENT]
         row[c.RATE] = run.drives.now[d.RATE, i]
 
 
@@ -116,22 +111,22 @@ def _follow_time_tables(run: _ChainRun, now: float, shift: float) -> None:
 @glue
 def _fill_frame_tensions(run: _ChainRun, i: int) -> None:
     """Fill the tensions of chain `i` at its frame end; they are zero if this end is free."""
-    chains, now, n, row = run.chains, run.drives.now, run.chains.counts[i], run.chains.table[i]
+    now, n, row = run.drives.now, run.counts[i], run.table[i]
     tension, whole, lifted = 0.0, 0.0, 0.0
     if row[c.FREE_END] == 0.0:
-        tension = c.tension_at_exit(chains.place[i], n, row, chains.pulls[i])
-        whole = c.whole_force(chains.place[i], chains.speed[i], n, row, chains.pulls[i])
+        tension = c.tension_at_exit(run.place[i], n, row, run.pulls[i])
+        whole = c.whole_force(run.place[i], run.speed[i], n, row, run.pulls[i])
         lifted = row[c.DENSITY] * run.gravity * run.drives.data[d.BEHIND_RISE, i]
     now[d.AT_FRAME, i], now[d.WHOLE, i] = tension, whole
     now[d.AT_DRUM, i] = d.tension_at_drum(whole, lifted, row[c.STIFFNESS])
-    mean, share = c.mean_tension(chains.pulls[i], n, row), row[c.SMOOTH] if run.at[progress.READY] == 2 else 1.0
+    mean, share = c.mean_tension(run.pulls[i], n, row), row[c.SMOOTH] if run.at[progress.READY] == 2 else 1.0
     run.rows[g.TENSION, i] = share * mean + (1.0 - share) * (run.rows[g.TENSION, i] if share < 1.0 else 0.0)
 
 
 @kernel
 def _fill_platform_force(run: _ChainRun) -> float:
     """Fill the force on the platform and the tensions at the winches. Returns the power lost [W]."""
-    chains, state = run.chains, run.state
+    state = run.state
     ends = run.cables[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
     center, velocity = state[rigid_body.CENTER :], state[rigid_body.VELOCITY :]
     lost = 0.0
@@ -140,8 +135,8 @@ def _fill_platform_force(run: _ChainRun) -> float:
     gx, gy, gz = run.given[0], run.given[1], run.given[2]
     fx, fy, fz = gx, gy, gz - run.inertia[rigid_body.MASS] * run.gravity
     mx, my, mz = run.given[3] + hy * gz - hz * gy, run.given[4] + hz * gx - hx * gz, run.given[5] + hx * gy - hy * gx
-    for i in range(chains.counts.shape[0]):
-        n, row, place, speed = chains.counts[i], chains.table[i], chains.place[i], chains.speed[i]
+    for i in range(run.counts.shape[0]):
+        n, row, place, speed = run.counts[i], run.table[i], run.place[i], run.speed[i]
         x, y, z = turned(state, ends[i, 0], ends[i, 1], ends[i, 2])
         if row[c.FREE_START] == 0.0:
             place[0, 0], place[1, 0], place[2, 0] = center[0] + x, center[1] + y, center[2] + z
@@ -149,14 +144,14 @@ def _fill_platform_force(run: _ChainRun) -> float:
             speed[1, 0] = velocity[1] + (wz * x - wx * z)
             speed[2, 0] = velocity[2] + (wx * y - wy * x)
         c.fill_frame_node_velocity(place, speed, n, row)
-        lost += c.fill_element_forces(place, speed, n, row, chains.pulls[i])
+        lost += c.fill_element_forces(place, speed, n, row, run.pulls[i])
         _fill_frame_tensions(run, i)
         if row[c.FREE_START] > 0.0:
             continue
         air = 0.5 * row[c.DENSITY] * row[c.ELEMENT] * row[c.AIR_RATE]
-        px = chains.pulls[i, 0] * (place[0, 1] - place[0, 0]) - air * speed[0, 0]
-        py = chains.pulls[i, 0] * (place[1, 1] - place[1, 0]) - air * speed[1, 0]
-        pz = chains.pulls[i, 0] * (place[2, 1] - place[2, 0]) - air * speed[2, 0]
+        px = run.pulls[i, 0] * (place[0, 1] - place[0, 0]) - air * speed[0, 0]
+        py = run.pulls[i, 0] * (place[1, 1] - place[1, 0]) - air * speed[1, 0]
+        pz = run.pulls[i, 0] * (place[2, 1] - place[2, 0]) - air * speed[2, 0]
         lost += air * (speed[0, 0] ** 2 + speed[1, 0] ** 2 + speed[2, 0] ** 2)
         if run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0:
             bx, by, bz = c.wind_on_element(place, 0, 1, 0.5 * row[c.ELEMENT] * row[c.WIND], run.wind)
@@ -185,17 +180,17 @@ def _power_of_given_wrench(run: _ChainRun) -> float:
 @kernel
 def _kick_chains(run: _ChainRun, h: float, begins: bool) -> None:
     """Update the nodes' velocities by forces, air and wind during `h`. At the start of a step, forces come last."""
-    chains, audit = run.chains, run.drives.audit
+    audit = run.drives.audit
     blows = run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0
-    for i in range(chains.counts.shape[0]):
-        n, row, place, speed = chains.counts[i], chains.table[i], chains.place[i], chains.speed[i]
+    for i in range(run.counts.shape[0]):
+        n, row, place, speed = run.counts[i], run.table[i], run.place[i], run.speed[i]
         if not begins:
-            c.kick_nodes(place, speed, n, row, chains.pulls[i], h)
+            c.kick_nodes(place, speed, n, row, run.pulls[i], h)
         audit[d.LOST] += c.slow_by_air(speed, n, row, h)
         if blows:
             audit[d.SUPPLIED] += c.add_wind_on_nodes(place, speed, n, row, run.wind, h)
         if begins:
-            c.kick_nodes(place, speed, n, row, chains.pulls[i], h)
+            c.kick_nodes(place, speed, n, row, run.pulls[i], h)
 
 
 ENDED = progress.COUNTERS  # additional counter for cables with mass: index of the cable that ended the run
@@ -209,17 +204,17 @@ GROWTH = 0.5
 @glue
 def _energy_of(run: _ChainRun, i: int) -> tuple[float, float]:
     """Energy of chain `i` with its half element at the exit, and energy of this half element [J]."""
-    chains, n, row = run.chains, run.chains.counts[i], run.chains.table[i]
-    strain, raised = c.potential(chains.place[i], n, row)
-    entering = c.kinetic_at_exit(chains.speed[i], n, row)
-    return strain + raised + c.kinetic(chains.speed[i], n, row) + entering, entering
+    n, row = run.counts[i], run.table[i]
+    strain, raised = c.potential(run.place[i], n, row)
+    entering = c.kinetic_at_exit(run.speed[i], n, row)
+    return strain + raised + c.kinetic(run.speed[i], n, row) + entering, entering
 
 
 @kernel
 def _change_node_count(run: _ChainRun, i: int) -> None:
     """Add or remove one node of chain `i` at the frame, and add the change of energy to the energy audit."""
-    chains, audit = run.chains, run.drives.audit
-    row, place, speed, n = chains.table[i], chains.place[i], chains.speed[i], chains.counts[i]
+    audit = run.drives.audit
+    row, place, speed, n = run.table[i], run.place[i], run.speed[i], run.counts[i]
     more = 1 if row[c.REST] > row[c.ELEMENT] else -1
     if n + more < FEWEST or n + more + 2 > place.shape[1]:
         run.at[progress.FAILED], run.at[ENDED] = i + 1, (SHORT if more < 0 else LONG)
@@ -229,13 +224,13 @@ def _change_node_count(run: _ChainRun, i: int) -> None:
         c.insert_node(place, speed, n, row)
     else:
         c.merge_nodes(place, speed, n, row)
-    chains.counts[i] = n + more
+    run.counts[i] = n + more
     row[c.REST] -= more * row[c.ELEMENT]
     after, entering = _energy_of(run, i)
     audit[d.LOST] += before - after
     audit[d.SUPPLIED] -= entering - entering_before  # the winch supplies the energy of the half element at the exit
-    c.fill_element_forces(place, speed, n + more, row, chains.pulls[i])
-    run.drives.now[d.WHOLE, i] = c.whole_force(place, speed, n + more, row, chains.pulls[i])
+    c.fill_element_forces(place, speed, n + more, row, run.pulls[i])
+    run.drives.now[d.WHOLE, i] = c.whole_force(place, speed, n + more, row, run.pulls[i])
 
 
 @kernel
@@ -256,15 +251,15 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
 def _record_chain_step(run: _ChainRun, records: Records, stock: Array) -> None:
     """Record a step, and check that the energy does not increase by more than the supplied energy."""
     states, tensions, lengths, energies, _notes, points = records
-    state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
+    state, drives, at, r = run.state, run.drives, run.at, run.at[progress.RECORDS]
     audit = drives.audit
     kinetic, strain = rigid_body.kinetic_energy(state, run.inertia), 0.0
     raised = run.inertia[rigid_body.MASS] * run.gravity * state[rigid_body.CENTER + 2]
     size, wildest, blamed = abs(raised), -1.0, 0
-    for i in range(chains.counts.shape[0]):
-        n, row = chains.counts[i], chains.table[i]
-        stretched, height = c.potential(chains.place[i], n, row)
-        swinging = c.kinetic(chains.speed[i], n, row)
+    for i in range(run.counts.shape[0]):
+        n, row = run.counts[i], run.table[i]
+        stretched, height = c.potential(run.place[i], n, row)
+        swinging = c.kinetic(run.speed[i], n, row)
         kinetic, strain, size = kinetic + swinging, strain + stretched, size + abs(height)
         raised += height
         if row[c.FREE_START] == 0.0:
@@ -290,16 +285,16 @@ def _record_chain_step(run: _ChainRun, records: Records, stock: Array) -> None:
             states[r, rigid_body.MOMENTUM + k] = turning[k]
         energies[r, progress.KINETIC], energies[r, progress.POTENTIAL] = kinetic, potential
         energies[r, progress.SUPPLIED], energies[r, progress.LOST] = audit[d.SUPPLIED], audit[d.LOST]
-        for i in range(chains.counts.shape[0]):
+        for i in range(run.counts.shape[0]):
             tensions[r, i], lengths[r, i] = drives.now[d.AT_FRAME, i], run.rows[g.LENGTH, i]
-            _sample_points(chains.place[i], chains.counts[i], chains.table[i], points[r, int(chains.table[i, c.CABLE])])
+            _sample_points(run.place[i], run.counts[i], run.table[i], points[r, int(run.table[i, c.CABLE])])
         at[progress.RECORDS] += 1
 
 
 @glue
 def _split_step(run: _ChainRun, now: float) -> None:
     """Take one step from the time `now`. The stored forces belong to the start of the step, afterwards to its end."""
-    h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
+    h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
     drives.audit[d.SUPPLIED] += half * _power_of_given_wrench(run)
     rigid_body.kick_body(run.state, run.inertia, run.force, half)
     _kick_chains(run, half, True)
@@ -310,10 +305,10 @@ def _split_step(run: _ChainRun, now: float) -> None:
     d.turn_winches(drives, run.cables, rows, run.gravity, h)
     _follow_time_tables(run, now + h, -progress.MOMENT * h)
     for i in range(rows.shape[1]):
-        row = chains.table[i]
+        row = run.table[i]
         paid_out = 0.0 if row[c.FREE_END] > 0.0 else rows[g.LENGTH, i] - drives.now[d.BEFORE, i]
         before = row[c.REST] - paid_out
-        c.drift_nodes(chains.place[i], chains.speed[i], chains.counts[i], row, before, h)
+        c.drift_nodes(run.place[i], run.speed[i], run.counts[i], row, before, h)
     drives.audit[d.LOST] += h * _fill_platform_force(run)
     d.add_winch_energy(drives, run.cables, rows, h)
     rigid_body.kick_body(run.state, run.inertia, run.force, half)
@@ -325,9 +320,9 @@ def _split_step(run: _ChainRun, now: float) -> None:
 @glue
 def _change_node_counts(run: _ChainRun) -> None:
     """Add or remove a node of each chain whose element at the frame is too long or too short."""
-    for i in range(run.chains.counts.shape[0]):
-        rest, element = run.chains.table[i, c.REST], run.chains.table[i, c.ELEMENT]
-        if run.chains.table[i, c.FREE_END] == 0.0 and not c.LEAST * element < rest < c.MOST * element:
+    for i in range(run.counts.shape[0]):
+        rest, element = run.table[i, c.REST], run.table[i, c.ELEMENT]
+        if run.table[i, c.FREE_END] == 0.0 and not c.LEAST * element < rest < c.MOST * element:
             _change_node_count(run, i)
 
 
