@@ -289,7 +289,6 @@ REFUSING: dict[str, Callable[[], object]] = {
     "linearized": lambda: sl.linearized(SOME, POSE),
     "frequency_response": lambda: sl.frequency_response(SOME, POSE, frequency=[1.0]),
     "simulate": lambda: sl.simulate(SOME, POSE, duration=0.05),
-    "workspace": lambda: sl.workspace(SOME, cells=4),
     "workspace of four cables": lambda: sl.workspace(
         four_cables().replace(winches=sl.Winch(0.03, on_platform=[False] * 3 + [True])), cells=4
     ),

@@ -24,7 +24,7 @@ from sagline.kinematics.inverse_rows import SOLVED, InverseRows
 from sagline.robot.batch import Robots, cables_of, first_of, on_platform, robots_at
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
-from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing_chords, robot_terms, tangent_eyelets
+from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing_chords, robot_terms, tangent_exits
 
 if TYPE_CHECKING:
     from sagline.kernels.inverse.poses import Robots as RobotTerms
@@ -153,16 +153,16 @@ def _solve_on_platform(
         np.copyto(numbers[..., :3], (numbers[..., :3] - place[:, None]) @ matrix, where=on)
         return _Pass(found, rows, chord, numbers, change)
 
-    straight = tangent_eyelets(table, pose, geometry)
-    frame, platform = straight[..., : tables.PLATFORM_X], straight[..., tables.PLATFORM_X : tables.DENSITY]
-    return _pass_by_pass(run, np.where(aboard, platform, frame), np.arange(len(straight)))
+    exits = tangent_exits(table, pose, geometry)
+    exits = np.where(aboard, (exits - places[:, None]) @ matrices, exits)
+    return _pass_by_pass(run, exits, np.arange(len(exits)))
 
 
 def _tangent_exits(robot: Robots, pose: Pose, table: Array) -> Array:
     """Exit points (N, m, 3) [m] of straight cables from pulleys at the frame."""
     geometry = chord_geometry(robot, pose, slanted=True)
     refuse_missing_chords(robot, pose, geometry)
-    return tangent_eyelets(table, pose, geometry)[..., : tables.PLATFORM_X]
+    return tangent_exits(table, pose, geometry)
 
 
 def _pass_by_pass(
@@ -236,6 +236,23 @@ def _in_world(table: Array, place: Array, matrix: Array) -> tuple[Array, Array]:
     rise = world[..., tables.AXIS_Z] * table[..., tables.DEAD_CABLE]
     np.copyto(world[..., tables.DEAD_RISE], rise, where=on[..., 0])
     return locked(world), np.where(on, frame, ends)
+
+
+def weight_off_platform(
+    robot: Robots, model: CableModel, pose: Pose, exits: Array, forces: Array, free: Array
+) -> Array:
+    """Wrenches (N, 6) by which the cables of winches on the platform reduce its weight, about the center of mass.
+
+    `exits` (N, m, 3) [m]: exit points. `forces` (N, m, 3) [N]: cable forces there, toward the other ends. `free` (N, m)
+    [m]: unstrained lengths of the free spans.
+    """
+    _freedom, bodies, table = robot_terms(robot, slanted=True)
+    place, matrix = pose.position.reshape(-1, 3), pose.matrix.reshape(-1, 3, 3)
+    world, ends = _in_world(table, place, matrix)
+    numbers = np.empty((*free.shape, 8))
+    size = _norm(ends - exits)
+    exits_of_forces(world, locked(bodies[:, tables.GRAVITY].copy()), forces, exits, size, numbers)
+    return _weight_taken(robot, model, world, bodies, place, matrix, free, numbers)
 
 
 def _weight_taken(

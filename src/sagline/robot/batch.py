@@ -98,8 +98,10 @@ def refuse_slanted(robot: Robots, *, only_platform: bool = False) -> None:
         if refused.any():
             cable = int(np.argmax(refused))
             if winches.on_platform[cable]:
-                step = "On the platform: use inverse, forward, confirm, stiffness or modes, without friction; or "
-                step += "margin or workspace, with massless cables."
+                step = (
+                    "On the platform: use inverse, forward, confirm, stiffness, modes, margin or workspace (not with "
+                )
+                step += "fewer cables than freedoms), without friction."
                 raise InvalidValueError(f"winches: on_platform[{cable}]", "true", "false here", step)
             shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
             step = (

@@ -96,23 +96,28 @@ def geometry_of(cables: Array, bodies: Array, poses: Array) -> Array:
     return out
 
 
-def tangent_eyelets(table: Array, pose: Pose, geometry: Array) -> Array:
-    """Table (N, m, CABLE_COLUMNS) of cables from eyelets at the exit points of straight cables; NaN without a tangent.
+def tangent_exits(table: Array, pose: Pose, geometry: Array) -> Array:
+    """Exit points (N, m, 3) of straight cables in world axes [m]; NaN without a tangent.
 
     `table` (1 or N, m, SWIVEL_COLUMNS) and `geometry` (N, GEOMETRY_ROWS, m) have swivel axes of any direction.
     """
-    aboard, frame = table[..., tables.ENTRY, None] == 0.0, table[..., : tables.PLATFORM_X]
-    platform = table[..., tables.PLATFORM_X : tables.DENSITY]
-    place, matrix = pose.position.reshape(-1, 1, 3), pose.matrix.reshape(-1, 3, 3)
+    anchors = table[..., tables.PLATFORM_X : tables.DENSITY] @ np.swapaxes(pose.matrix.reshape(-1, 3, 3), -1, -2)
     level = geometry[:, rows.SPAN, :, None] * np.moveaxis(geometry[:, rows.AZIMUTH_X : rows.AZIMUTH_Y + 1], 1, -1)
     tangent = np.concatenate((level, geometry[:, rows.RISE, :, None]), axis=-1)
-    exits = np.where(aboard, frame, place + platform @ np.swapaxes(matrix, -1, -2)) - tangent
+    aboard, frame = table[..., tables.ENTRY, None] == 0.0, table[..., : tables.PLATFORM_X]
+    return np.asarray(np.where(aboard, frame, pose.position.reshape(-1, 1, 3) + anchors) - tangent)
+
+
+def eyelets_at(table: Array, pose: Pose, exits: Array) -> Array:
+    """Table (N, m, CABLE_COLUMNS) of cables from eyelets at their exit points `exits` (N, m, 3) [m], world axes."""
+    aboard = table[..., tables.ENTRY, None] == 0.0
+    turned = (exits - pose.position.reshape(-1, 1, 3)) @ pose.matrix.reshape(-1, 3, 3)
     eyelets = np.empty((len(exits), table.shape[1], tables.CABLE_COLUMNS))
     eyelets[:] = table[..., : tables.CABLE_COLUMNS]
     eyelets[..., tables.PULLEY_RADIUS :] = 0.0
     eyelets[..., tables.ENTRY] = 1.0
     np.copyto(eyelets[..., : tables.PLATFORM_X], exits, where=~aboard)
-    np.copyto(eyelets[..., tables.PLATFORM_X : tables.DENSITY], (exits - place) @ matrix, where=aboard)
+    np.copyto(eyelets[..., tables.PLATFORM_X : tables.DENSITY], turned, where=aboard)
     return eyelets
 
 

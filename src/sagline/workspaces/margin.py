@@ -21,13 +21,13 @@ from sagline.kernels import codes, tables
 from sagline.kernels.memory import memory_for
 from sagline.kernels.workspaces.signed_margin import margin_memory, signed_margins
 from sagline.kernels.workspaces.wrench_set import SetTerms
-from sagline.robot.batch import Robots, first_of, has_slanted_axes, one_a_pose, refuse_slanted, robot_fields, together
+from sagline.robot.batch import Robots, first_of, has_slanted_axes, one_a_pose, robot_fields, together
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_cable_count, check_reach
 from sagline.robot.robot import Robot
-from sagline.statics.tables import check_slanted, geometry_of, pose_rows, robot_terms, tangent_eyelets
+from sagline.statics.tables import check_slanted, eyelets_at, geometry_of, pose_rows, robot_terms, tangent_exits
 from sagline.tension.method import LIMITS_OF
-from sagline.workspaces.moving_exits import move_exits
+from sagline.workspaces.moving_exits import with_moving_exits
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet, load_of
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     _Given = tuple[ModelTerms, LimitTerms, RobotTerms, SetTerms, tuple[Array, Array]]
 
 BLOCK = 1 << 13  # poses per block; a block takes about 0.1 s, and interrupts are handled between blocks
-_CATENARY = Catenary()
+_CATENARY, _ALL = Catenary(), slice(None)
 
 
 class Bracket(NamedTuple):
@@ -74,7 +74,6 @@ class MarginRows:
         shared = first_of(robots)
         moving = not model.weightless and has_slanted_axes(robots)
         if moving:
-            refuse_slanted(robots, only_platform=True)
             check_slanted(robots, model)
         # robots with exit points that move with the tensions
         self._robots = (robots, model) if moving else None
@@ -112,26 +111,27 @@ class MarginRows:
             return _measured(self._given, rows, progress)
         model, limits, (freedom, *terms), loads, both = self._given
         bodies, table, inertias, arm, lever = (_each(array, count) for array in (*terms, loads[-1], *both))
-        geometry = geometry_of(table, bodies, rows)
-        # cables from eyelets at the exit points of straight cables
-        eyelets = locked(tangent_eyelets(table, Pose._adopt(rows[:, :3], rows[:, 3:]), geometry))
-        loads = *loads[:-1], inertias
-        found = _measured((model, limits, (freedom, bodies, eyelets), loads, (arm, lever)), rows, progress)
-        if self._robots is not None:
+        pose, geometry = Pose._adopt(rows[:, :3], rows[:, 3:]), geometry_of(table, bodies, rows)
 
-            def at_exits(which: Indices, exits: Array) -> Array:
-                """Margins of the poses `which` with other exit points."""
-                own = eyelets[which]
-                own[..., : tables.PLATFORM_X] = exits
-                some, arms = (freedom, _at(bodies, which), locked(own)), (_at(arm, which), _at(lever, which))
-                return _measured((model, limits, some, (*loads[:-1], _at(inertias, which)), arms), rows[which]).value
+        def at_exits(exits: Array, off: Array | None = None, which: Indices | slice = _ALL) -> Bracket:
+            """Margins of the poses `which` of cables from eyelets at `exits`. `off`: wrenches of winches aboard."""
+            eyelets = locked(eyelets_at(_at(table, which), pose[which], exits))
+            own, arms = (freedom, _at(bodies, which), eyelets), (_at(arm, which), _at(lever, which))
+            given = model, limits, own, (*loads[:-1], _at(inertias, which)), arms
+            return _measured(given, rows[which], progress if which is _ALL else None, off)
 
-            move_exits(*self._robots, rows, (limits[0], bodies, table, geometry, arm), loads, at_exits, found)
-        return found
+        exits = tangent_exits(table, pose, geometry)
+        if self._robots is None:
+            return at_exits(exits)
+        robots, cable_model = self._robots
+        if not isinstance(robots, Robot):
+            robots = tuple(robots[k * len(robots) // count] for k in range(count))
+        given = limits[0], bodies, table, geometry, arm
+        return with_moving_exits(robots, cable_model, pose, exits, given, (*loads[:-1], inertias), at_exits)
 
 
-def _measured(given: _Given, rows: Array, progress: Progress | None = None) -> Bracket:
-    """Margins at the poses `rows` (N, 7) from the arguments of the kernel."""
+def _measured(given: _Given, rows: Array, progress: Progress | None, off: Array | None = None) -> Bracket:
+    """Margins at the poses `rows` (N, 7) from the arguments of the kernel. `off`: further wrenches, one per pose."""
     count, (freedom, _bodies, table) = len(rows), given[2]
     m = table.shape[1]
     numbers, counters = _memory_sizes(len(freedom), m)
@@ -142,12 +142,16 @@ def _measured(given: _Given, rows: Array, progress: Progress | None = None) -> B
         np.empty(count, dtype=np.int64),
         np.empty(count, dtype=np.int8),
     )
-    arguments = (*given, locked(rows), memory, margins)
-    if count <= BLOCK and progress is None:
-        signed_margins(*arguments, 0, count)
+    arguments = locked(rows), memory, margins
+    if off is not None:
+        for k in (k for part in blocks(count, BLOCK, progress) for k in range(part.start, part.stop)):
+            loads = locked(given[3][0] + off[k]), *given[3][1:]
+            signed_margins(*given[:3], loads, given[4], *arguments, k, k + 1)
+    elif count <= BLOCK and progress is None:
+        signed_margins(*given, *arguments, 0, count)
     else:
         for part in blocks(count, BLOCK, progress):
-            signed_margins(*arguments, part.start, part.stop)
+            signed_margins(*given, *arguments, part.start, part.stop)
     values, directions, limiting, statuses = margins
     return Bracket(values[0], values[1], values[2], limiting, statuses, directions)
 
@@ -164,7 +168,7 @@ def _each(array: Array, count: int) -> Array:
     return array if len(array) == 1 else locked(np.repeat(array, count // len(array), axis=0))
 
 
-def _at(array: Array, which: Indices) -> Array:
+def _at(array: Array, which: Indices | slice) -> Array:
     """Rows `which` of an array with one row per pose; one row remains one row."""
     return array if len(array) == 1 else locked(array[which])
 
@@ -329,8 +333,7 @@ def margin(
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind. If the robot has fewer cables than degrees of freedom.
-            If its motion pattern does not allow the motion from the first pose to another pose. If a cable with mass
-            has a winch on the platform.
+            If its motion pattern does not allow the motion from the first pose to another pose.
 
     Examples:
         >>> import sagline as sl
