@@ -179,10 +179,8 @@ POSE = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
 REFUSING: dict[str, Callable[[], object]] = {
     "structure_matrix": lambda: sl.structure_matrix(SOME_SLANTED, POSE),
     "tension_polygon": lambda: sl.tension_polygon(SOME_SLANTED, POSE),
-    "margin": lambda: sl.margin(SOME_SLANTED, POSE),
     "InverseSolver": lambda: sl.InverseSolver(SOME_SLANTED),
     "vibration": lambda: sl.vibration(SOME_SLANTED, POSE),
-    "workspace": lambda: sl.workspace(SOME_SLANTED, cells=4),
     "fastest": lambda: sl.fastest(SOME_SLANTED, sl.quintic_path([(0.0, 0.0, 1.5), (0.5, 0.3, 1.8)], speed=0.5)),
     "design": lambda: sl.design(
         SOME_SLANTED,
