@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -56,11 +57,17 @@ def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[n
         whole = (*shape, request.cable_count)[: 2 + len(one.parts)]
         filled[one.name] = np.full(whole, unknown_value(one), dtype=one.type)
     robot = request.robots[part.robot]
-    solvers = [kind(request, robot) for kind, names in SOLVERS.items() if names.intersection(request.quantities)]
+    solvers: list[Callable[[RequestBox], dict[str, NDArray[Any]]]] = []
+    if set(request.quantities) != {"margin"}:
+        options = kernel_options(robot, request.model, request.tension)
+        solvers.append(partial(_inverse_answers, request, robot, options))
+    if "margin" in request.quantities:
+        margins = MarginRows(robot, request.around, request.model, request.moment_arm)
+        solvers.append(partial(_margin_answers, request, margins))
     for piece in part.pieces(ROWS):
         rows = slice(piece.poses.start - part.poses.start, piece.poses.stop - part.poses.start)
         columns = slice(piece.wrenches.start - part.wrenches.start, piece.wrenches.stop - part.wrenches.start)
-        answers = {name: found for solver in solvers for name, found in solver.answers(piece).items()}
+        answers = {name: found for solver in solvers for name, found in solver(piece).items()}
         for name, values in filled.items():
             found = answers[name]
             target = values[rows, columns]
@@ -79,65 +86,43 @@ def count_outcomes(numbers: dict[str, NDArray[np.generic]]) -> Counts:
     return Counts(feasible, infeasible, status.size - feasible - infeasible - left - lost, left, lost)
 
 
-class _Inverse:
-    """Solver for statuses, tensions and lengths of one robot, prepared once."""
-
-    def __init__(self, request: Request, robot: Robot) -> None:
-        self._request, self._robot = request, robot
-        self._options = kernel_options(robot, request.model, request.tension)
-
-    def answers(self, part: RequestBox) -> dict[str, NDArray[Any]]:
-        """Variables by name for the N requests of a part, (N,) or (N, m)."""
-        request = self._request
-        poses, loads = _rows(request.poses, part.poses), request.wrenches[part.wrenches]
-        rows = locked(np.repeat(poses, len(loads), axis=0))
-        wrenches = locked(np.tile(loads, (len(poses), 1)))
-        none = np.full(self._robot.cable_count, np.nan)
-        found = solve_inverse_rows(self._robot, request.tension, self._options, rows, wrenches, none)
-        answers: dict[str, NDArray[Any]] = {}
-        if "shortfall" in request.quantities:
-            decide_rows(robot_terms(self._robot), self._options, rows, wrenches, found)
-            answers["enough"] = found.shortfall
-            answers["proof"] = found.brackets[:, tables.PROVED]
-        else:
-            answers["proof"] = _proofs_of(self._robot, self._options, poses, loads, found)
-        answers["status"] = found.pose_status
-        answers["tension"] = found.results[tables.TENSION]
-        answers["length"] = found.results[tables.LENGTH]
-        return answers
+def _inverse_answers(request: Request, robot: Robot, options: Options, part: RequestBox) -> dict[str, NDArray[Any]]:
+    """Statuses, tensions and lengths by name for the N requests of a part, (N,) or (N, m)."""
+    poses, loads = _rows(request.poses, part.poses), request.wrenches[part.wrenches]
+    rows = locked(np.repeat(poses, len(loads), axis=0))
+    wrenches = locked(np.tile(loads, (len(poses), 1)))
+    none = np.full(robot.cable_count, np.nan)
+    found = solve_inverse_rows(robot, request.tension, options, rows, wrenches, none)
+    answers: dict[str, NDArray[Any]] = {}
+    if "shortfall" in request.quantities:
+        decide_rows(robot_terms(robot), options, rows, wrenches, found)
+        answers["enough"] = found.shortfall
+        answers["proof"] = found.brackets[:, tables.PROVED]
+    else:
+        answers["proof"] = _proofs_of(robot, options, poses, loads, found)
+    answers["status"] = found.pose_status
+    answers["tension"] = found.results[tables.TENSION]
+    answers["length"] = found.results[tables.LENGTH]
+    return answers
 
 
-class _Margins:
-    """Solver for the margins of one robot, prepared once."""
-
-    def __init__(self, request: Request, robot: Robot) -> None:
-        self._request = request
-        self._rows = MarginRows(robot, request.around, request.model, request.moment_arm)
-
-    def answers(self, part: RequestBox) -> dict[str, NDArray[Any]]:
-        """Variables by name for the N requests of a part, (N,)."""
-        poses = _rows(self._request.poses, part.poses)
-        found = [self._rows.about(load).rows(poses) for load in self._request.wrenches[part.wrenches]]
-        columns: dict[str, list[NDArray[Any]]] = {
-            "margin": [each.value for each in found],
-            "margin_low": [each.low for each in found],
-            "margin_high": [each.high for each in found],
-            "limiting_cable": [each.cable for each in found],
-            "margin_status": [each.status for each in found],
-        }
-        return {name: np.stack(values, axis=1).ravel() for name, values in columns.items()}
+def _margin_answers(request: Request, margins: MarginRows, part: RequestBox) -> dict[str, NDArray[Any]]:
+    """Margins by name for the N requests of a part, (N,)."""
+    poses = _rows(request.poses, part.poses)
+    found = [margins.about(load).rows(poses) for load in request.wrenches[part.wrenches]]
+    columns: dict[str, list[NDArray[Any]]] = {
+        "margin": [each.value for each in found],
+        "margin_low": [each.low for each in found],
+        "margin_high": [each.high for each in found],
+        "limiting_cable": [each.cable for each in found],
+        "margin_status": [each.status for each in found],
+    }
+    return {name: np.stack(values, axis=1).ravel() for name, values in columns.items()}
 
 
 def _rows(poses: Pose, part: slice) -> Array:
     """Poses of a part with unchanged numbers, because the constructor of `Pose` would normalize quaternions again."""
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
-
-
-# class of each solver, and quantities that it computes
-SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
-    _Inverse: frozenset({"tension", "length", "shortfall"}),
-    _Margins: frozenset({"margin"}),
-}
 
 
 SECONDS: Final = 0.75  # [s], duration of a task; the scheduler needs a hundredth of this time per task
