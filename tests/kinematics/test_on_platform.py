@@ -299,7 +299,6 @@ REFUSING: dict[str, Callable[[], object]] = {
     "home": lambda: sl.home(SOME, POSE, np.full(8, 300.0)),
     "dump_mjcf": lambda: sl.dump_mjcf(SOME, POSE),
     "export_c": lambda: sl.export_c(SOME, "a.c"),
-    "plot.robot": lambda: sl.plot.robot(SOME, POSE),
 }
 
 

@@ -41,7 +41,7 @@ def test_cables_leave_their_pulleys_along_the_force_there(seed: int) -> None:
     np.testing.assert_allclose(np.linalg.norm(arm, axis=1), RADII, rtol=1e-13, atol=1e-15)
     cables = plan.state.cables
     weight = cables.cable.linear_density * 9.81 * plan.free_length
-    level = outward(ROBOT, pose) * cables.horizontal_tension[:, None]
+    level = outward(ROBOT, pose)[:, :2] * cables.horizontal_tension[:, None]
     force = np.concatenate((level, (cables.vertical_force - weight)[:, None]), axis=1)
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     np.testing.assert_allclose(np.einsum("ij,ij->i", arm, force), 0.0, atol=1e-9)
@@ -53,6 +53,12 @@ def test_cables_enter_upward_or_downward_at_their_anchors() -> None:
     np.testing.assert_array_equal(points_on_pulleys(ROBOT, pose, np.zeros(8)), ROBOT.frame_anchors)
     first = (points_on_pulleys(ROBOT, pose, np.full(8, step)) - ROBOT.frame_anchors) / step
     np.testing.assert_allclose(first, np.array(RADII)[:, None] * WINCH.swivel_axis, atol=1e-6)
+
+
+def test_the_axis_of_an_eyelet_has_no_effect() -> None:
+    pose = pose_of(1)
+    slanted, upright = (BASE.replace(winches=sl.Winch(0.0, swivel_axis=axis)) for axis in ([1.0, 0.5, 1.0], [0, 0, 1]))
+    np.testing.assert_array_equal(outward(slanted, pose), outward(upright, pose))
 
 
 def test_dead_length_of_one_robot_and_of_several() -> None:

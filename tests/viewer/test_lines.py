@@ -75,7 +75,7 @@ def test_cables_lead_from_the_anchor_over_the_pulley_to_the_platform() -> None:
     """Lengths on pulleys are drawn as arcs with their radius, and the cable is straight elsewhere."""
     plan = sl.inverse(OVER_PULLEYS, POSE)
     assert plan.wrap_angle is not None
-    wraps = shapes.wraps(OVER_PULLEYS, POSE, plan.wrap_angle)
+    wraps = shapes.wraps(OVER_PULLEYS, POSE, plan.state)
     np.testing.assert_array_equal(wraps[:, 0], ROBOT.frame_anchors)
     np.testing.assert_allclose(wraps[:, -1], plan.exit_point, atol=1e-15)
     on_pulley = np.linalg.norm(np.diff(wraps, axis=1), axis=2).sum(axis=1)
@@ -95,7 +95,7 @@ def test_cables_lead_from_the_anchor_over_the_pulley_to_the_platform() -> None:
 
 def test_straight_cables_leave_pulleys_like_weightless_ones() -> None:
     plan = sl.inverse(OVER_PULLEYS, POSE, model=sl.Elastic())
-    np.testing.assert_allclose(shapes.wraps(OVER_PULLEYS, POSE, None)[:, -1], plan.exit_point, atol=1e-12)
+    np.testing.assert_allclose(shapes.wraps(OVER_PULLEYS, POSE)[:, -1], plan.exit_point, atol=1e-12)
 
 
 def test_the_dead_length_is_drawn_to_its_rise() -> None:

@@ -59,14 +59,13 @@ def test_pulleys_and_exit_points_follow_the_platform(server: PageServer) -> None
     stage = RobotScene(server.scene, robot, home_pose(robot))
     wheels = node(server, "/pulleys")
     assert np.asarray(wheels.batched_scales) == pytest.approx(0.25)
-    assert np.asarray(wheels.batched_positions) == pytest.approx(robot.frame_anchors, abs=1e-6)
     seen = []
     for position in ([0.0, 0.0, 2.0], [1.0, 0.5, 2.5]):
         snapshot = snapshot_at(robot, sl.Pose(position, np.eye(3)), Settings(mass=robot.mass), None)
         stage.show(snapshot, TensionScale.of(robot), 1.0, 1.0, ghost=True)
-        assert np.asarray(wheels.batched_wxyzs) == pytest.approx(
-            shapes.pulley_rotations(robot, snapshot.pose), abs=1e-6
-        )
+        centers, turns = snapshot.wheels()
+        assert np.asarray(wheels.batched_positions) == pytest.approx(centers, abs=1e-6)
+        assert np.asarray(wheels.batched_wxyzs) == pytest.approx(turns, abs=1e-6)
         points = np.asarray(node(server, "/cables").points).reshape(8, -1, 2, 3)
         assert points[:, 0, 0] == pytest.approx(robot.frame_anchors, abs=1e-6)
         exits = sl.inverse(robot, snapshot.pose).exit_point

@@ -63,22 +63,25 @@ def test_scale_bars_have_round_lengths(length: float, rounded: float) -> None:
     assert shapes.round_below(length) == pytest.approx(rounded, rel=1e-12)
 
 
-def test_a_pulley_is_at_the_entry_of_its_cable_with_its_radius() -> None:
+def test_a_pulley_has_its_radius_about_its_middle() -> None:
     wheel = mesh(shapes.Solid.wheel())
-    assert wheel.bounds[0] == pytest.approx([0.03, -0.1, -0.97], abs=0.01)  # entered at the origin, a bit of room
-    assert wheel.bounds[1] == pytest.approx([1.97, 0.1, 0.97], abs=0.01)
+    assert wheel.bounds[0] == pytest.approx([-0.97, -0.1, -0.97], abs=0.01)  # a bit of room for the cable
+    assert wheel.bounds[1] == pytest.approx([0.97, 0.1, 0.97], abs=0.01)
     assert wheel.volume > 0.0
-    across = np.hypot(wheel.vertices[:, 0] - 1.0, wheel.vertices[:, 2])
+    across = np.hypot(wheel.vertices[:, 0], wheel.vertices[:, 2])
     assert across.max() <= 0.97 + 1e-12  # the cable, at 1, lies on it
 
 
 def test_pulleys_swivel_to_the_platform() -> None:
     robot = sl.load_robot("ipanema-2-pulleys")
     pose = sl.Pose.from_euler([0.5, -0.3, 2.0], 0.1, 0.0, 0.2)
-    turned = Rotation.from_quat(np.roll(shapes.pulley_rotations(robot, pose), -1, axis=1)).apply([1.0, 0.0, 0.0])
+    centers, turns = shapes.wheels(robot, pose)
+    turned = Rotation.from_quat(turns, scalar_first=True).apply([1.0, 0.0, 0.0])
     reach = pose.transform(robot.platform_anchors) - robot.frame_anchors
     reach[:, 2] = 0.0
-    assert turned == pytest.approx(reach / np.linalg.norm(reach, axis=1, keepdims=True), abs=1e-12)
+    reach /= np.linalg.norm(reach, axis=1, keepdims=True)
+    assert turned == pytest.approx(reach, abs=1e-12)
+    assert centers == pytest.approx(robot.frame_anchors + 0.25 * reach, abs=1e-12)
 
 
 def test_marks_replace_invisible_pulleys_and_drums_are_drawn() -> None:

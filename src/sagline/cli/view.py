@@ -297,12 +297,10 @@ def serve(
     **page: Any,
 ) -> int:
     """Serve a page until Ctrl-C, inside the context `meanwhile`. `page`: arguments of `Page`. Returns the exit code."""
-    from sagline.robot.batch import refuse_slanted
     from sagline.viewer import server as web
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
 
-    refuse_slanted(robot)
     names = address.allow_host or ()
     where = address.host, address.port, robot.name
     server = web.start_server(*where, token=address.token, clients=address.clients, allow_host=names)

@@ -69,7 +69,7 @@ def _lead_of(robot: Robot, pose: Pose) -> tuple[Array, Array, Array]:
     off = np.maximum(np.minimum(_OFF, 0.5 * before), before - wrap)
     first = np.maximum(wrap - before + off, 0.0)
     sine, cosine = np.sin(first), np.cos(first)
-    along = np.concatenate((sine[:, None] * outward(robot, pose), (entry * cosine)[:, None]), axis=1)
+    along = np.concatenate((sine[:, None] * outward(robot, pose)[:, :2], (entry * cosine)[:, None]), axis=1)
     start = points_on_pulleys(robot, pose, first) - (off * radius)[:, None] * along
     centers = pulley_centers(robot, pose)
     side = centers + _BESIDE * (points_on_pulleys(robot, pose, 0.5 * (first + wrap)) - centers)

@@ -21,7 +21,8 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels import codes, exits_of_forces, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kinematics.inverse_rows import SOLVED, InverseRows
-from sagline.robot.batch import Robots, cables_of, first_of, on_platform, robots_at
+from sagline.robot.batch import Robots, cables_of, first_of, has_slanted_axes, on_platform, robots_at
+from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
 from sagline.statics.tables import check_slanted, chord_geometry, refuse_missing_chords, robot_terms, tangent_exits
@@ -156,6 +157,33 @@ def _solve_on_platform(
     exits = tangent_exits(table, pose, geometry)
     exits = np.where(aboard, (exits - places[:, None]) @ matrices, exits)
     return _pass_by_pass(run, exits, np.arange(len(exits)))
+
+
+def with_eyelets(state: Equilibrium) -> Equilibrium:
+    """Single equilibrium of the same cables with eyelets at the exit points; `state` itself if all axes are vertical.
+
+    The robot of the result has the chords of the free spans. Its wrench includes the weight that cables take off a
+    platform with winches; see `_weight_taken`.
+    """
+    robot, pose, cables = state.one_robot, state.pose, state.cables
+    if not has_slanted_axes(robot):
+        return state
+    exits, on, wrench = state.exit_point, on_platform(robot)[:, None], state.wrench
+    if on.any():
+        _, bodies, table = robot_terms(robot, slanted=True)
+        place, matrix = pose.position[None], pose.matrix[None]
+        world, ends = _in_world(table, place, matrix)
+        chord = np.where(on, -1.0, 1.0) * (ends - exits)
+        results = np.full((tables.SWIVEL_ROWS, 1, robot.cable_count), np.nan)
+        results[tables.HORIZONTAL], results[tables.VERTICAL] = cables.horizontal_tension, cables.vertical_force
+        results[tables.LENGTH] = free = cables.unstrained_length
+        model = cables.model
+        numbers = _next_exits(robot, model, world, bodies, exits[None].copy(), chord, _norm(chord), results)
+        wrench = locked(wrench + _weight_taken(robot, model, world, bodies, place, matrix, free[None], numbers)[0])
+    anchors = np.where(on, robot.frame_anchors, exits)
+    ends = np.where(on, (exits - pose.position) @ pose.matrix, robot.platform_anchors)
+    eyelets = robot.replace(frame_anchors=anchors, platform_anchors=ends, winches=None)
+    return Equilibrium(eyelets, pose, wrench, cables)
 
 
 def _tangent_exits(robot: Robots, pose: Pose, table: Array) -> Array:

@@ -23,7 +23,7 @@ from sagline.kinematics.plan import Plan
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import VERMILLION, color_bar, sheet
 from sagline.plot.style import current
-from sagline.robot.batch import points_on_pulleys, pulleys_of
+from sagline.robot.batch import points_on_pulleys, pulley_radius
 from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.viewer import shapes
@@ -68,13 +68,16 @@ def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], 
     courses = shapes.courses(robot, pose, state, 1.0)
     cables = [Stroke(*each, 1.3, style, 2.0, covers=True) for each in zip(courses, colors, strict=True)]
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
-    circles = list(np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0])
-    known = None if robot.winches is None else robot.winches.drum_radius
-    circles += map(_rims, shapes.drum_axes(robot), [] if known is None else known)
+    rims = np.swapaxes(points_on_pulleys(robot, pose, turn, shapes.exits_of(state)), 0, 1)
+    circles = list(rims[pulley_radius(robot) > 0.0])
+    if robot.winches is not None and robot.winches.drum_radius is not None:
+        drums = np.array(list(map(_rims, shapes.drum_axes(robot), robot.winches.drum_radius)))
+        circles += list(shapes.in_world(robot, pose, drums))
     others = [Stroke(circle, WHEEL_COLOR, 0.8, "-", 1.9) for circle in circles]
-    for run, upright in zip(*shapes.dead_runs(robot), strict=True):
-        if run[0, 2] != run[1, 2]:
-            others.append(Stroke(run, WHEEL_COLOR, 0.7, "-" if upright else ":", 1.8))
+    runs, paths_known = shapes.dead_runs(robot)
+    for run, known in zip(shapes.in_world(robot, pose, runs), paths_known, strict=True):
+        if (run[0] != run[1]).any():
+            others.append(Stroke(run, WHEEL_COLOR, 0.7, "-" if known else ":", 1.8))
     frame, body = _frame_box(robot), platform_box(robot, pose)
     if frame is not None:
         others += [Stroke(frame[[*edge]], FRAME_COLOR, 0.7, "-", 1.7, covers=True) for edge in shapes.BOX_EDGES]
@@ -83,7 +86,7 @@ def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], 
 
 def _rims(ends: Array, radius: float) -> Array:
     """Both rims of a horizontal drum as one line. `ends` (2, 3): end points of the drum's axis."""
-    axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])  # in the axes of the winch
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
     return np.concatenate((ends[0] + rim, ends[1] + rim))

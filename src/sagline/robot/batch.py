@@ -99,29 +99,24 @@ def refuse_slanted(robot: Robots, *, only_platform: bool = False) -> None:
             cable = int(np.argmax(refused))
             if winches.on_platform[cable]:
                 step = (
-                    "On the platform: use inverse, forward, confirm, stiffness, modes, margin or workspace (not with "
+                    "On the platform: use inverse, forward, confirm, stiffness, modes, view, margin or workspace (not "
                 )
-                step += "fewer cables than freedoms), without friction."
+                step += "with fewer cables than freedoms), without friction."
                 raise InvalidValueError(f"winches: on_platform[{cable}]", "true", "false here", step)
             shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
             step = (
-                "Other axes: use inverse, forward, confirm, stiffness, modes, calibrate or simulate (massless cables), "
-                "margin or workspace, without friction."
+                "Other axes: use inverse, forward, confirm, stiffness, modes, view, calibrate or simulate (massless "
+                "cables), margin or workspace, without friction."
             )
             raise InvalidValueError(f"winches: swivel_axis[{cable}]", f"({shown})", "up or down here", step)
 
 
 def on_platform(robot: Robots) -> Flags:
     """True for each cable whose winch is on the platform, (m,) or (N, m)."""
-
-    def own(one: Robot) -> tuple[Array, ...]:
-        aboard = np.zeros(one.cable_count)
-        if one.winches is not None:
-            aboard[:] = one.winches.on_platform
-        return (aboard,)
-
-    aboard: Flags = _each(robot, own)[0] > 0.0
-    return aboard
+    robots = (robot,) if isinstance(robot, Robot) else robot
+    none = np.zeros(first_of(robot).cable_count, dtype=np.bool_)
+    flags = np.array([none if one.winches is None else one.winches.on_platform for one in robots])
+    return flags[0] if isinstance(robot, Robot) else flags
 
 
 def robot_fields(robot: Robots, *names: str) -> tuple[Array, ...]:
@@ -172,35 +167,73 @@ def _check_alike(first: Robot, other: Robot, index: int) -> None:
 
 
 _TINY = 1e-300
+_NEAR = 1e-9  # distance of an exit point from the swivel axis [m] below which its direction is lost in rounding
 
 
-def outward(robot: Robots, pose: Pose) -> Array:
-    """Horizontal unit vectors (..., m, 2) that point from frame anchors to platform ends; zero for a vertical cable."""
-    frame, platform = robot_fields(robot, "frame_anchors", "platform_anchors")
-    ends = pose.position[..., None, :] + platform @ np.swapaxes(pose.matrix, -1, -2)
-    level = (ends - frame)[..., :2]
-    unit: Array = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), _TINY)
-    return unit
+def pulley_radius(robot: Robots) -> Array:
+    """Radii of the pulleys [m], (m,) or (N, m); zero for a cable without a pulley."""
+    none = np.zeros(first_of(robot).cable_count)
+    return _each(robot, lambda one: (none if one.winches is None else one.winches.pulley_radius,))[0]
 
 
-def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
-    """Points on the pulleys in world axes [m], (..., m, 3); the frame anchor for a cable without a pulley.
+class CableEnds(NamedTuple):
+    """Both ends of the cables, and the swivel axes of their pulleys, in world axes, (..., m, 3) each."""
 
-    The swivel angles of the pulleys belong to `pose`, which is one pose or a batch. `angle` (..., m) [rad] is the
-    position on the pulley: 0 at the frame anchor, and the wrap angle at the exit point.
+    entry: Array  # point at which the cable enters its pulley or eyelet [m]
+    axis: Array  # unit vector along the cable there
+    other: Array  # end without a pulley [m]
+
+
+def cable_ends(robot: Robots, pose: Pose) -> CableEnds:
+    """Ends of the cables at a pose or a batch. Pulleys are at the frame anchors, or on the platform at its anchors."""
+    (frame, platform), back = robot_fields(robot, "frame_anchors", "platform_anchors"), np.swapaxes(pose.matrix, -1, -2)
+    up = np.zeros(frame.shape[-2:]) + np.array([0.0, 0.0, 1.0])
+    (axis,) = _each(robot, lambda one: (up if one.winches is None else _axes_of(one.winches),))
+    ends, aboard = pose.position[..., None, :] + platform @ back, on_platform(robot)[..., None]
+    return CableEnds(np.where(aboard, ends, frame), np.where(aboard, axis @ back, axis), np.where(aboard, frame, ends))
+
+
+def _axes_of(winches: Winch) -> Array:
+    """Swivel axes (m, 3); that of an eyelet at the frame counts as vertical, because it has no effect."""
+    upright = np.zeros(winches.swivel_axis.shape)
+    upright[:, 2] = np.where(winches.swivel_axis[:, 2] < 0.0, -1.0, 1.0)
+    eyelet = (winches.pulley_radius == 0.0) & ~winches.on_platform
+    return np.where(eyelet[:, None], upright, winches.swivel_axis)
+
+
+def outward(robot: Robots, pose: Pose, exits: Array | None = None) -> Array:
+    """Unit vectors (..., m, 3) from the swivel axes to the centers of the pulleys; zero for a cable along its axis.
+
+    A pulley is in the plane of its axis and the other end of the cable, or of its axis and the exit point. `exits`
+    (..., m, 3) [m]: exit points, which the weight of the cable on an inclined pulley moves out of the first plane.
     """
-    radius, entry = pulleys_of(robot)
-    away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
-    up = (radius * entry * np.sin(angle))[..., None]
-    (frame,) = robot_fields(robot, "frame_anchors")
-    return np.asarray(frame + np.concatenate((away, up), axis=-1))
+    entry, axis, other = cable_ends(robot, pose)
+
+    def normal_to_axis(way: Array) -> tuple[Array, Array]:
+        across = way - axis * (way * axis).sum(axis=-1, keepdims=True)
+        return across, np.linalg.norm(across, axis=-1, keepdims=True)
+
+    across, size = normal_to_axis(other - entry)
+    if exits is not None:
+        exact, distance = normal_to_axis(exits - entry)
+        across, size = np.where(distance > _NEAR, exact, across), np.where(distance > _NEAR, distance, size)
+    return np.asarray(across / np.maximum(size, _TINY))
 
 
-def pulley_centers(robot: Robot, pose: Pose) -> Array:
-    """Centers of the pulleys [m], shape (m, 3); the horizontal distance from the frame anchor is the pulley radius."""
-    centers = robot.frame_anchors.copy()
-    centers[:, :2] += pulleys_of(robot).radius[:, None] * outward(robot, pose)
-    return locked(centers)
+def points_on_pulleys(robot: Robots, pose: Pose, angle: Array, exits: Array | None = None) -> Array:
+    """Points on the pulleys in world axes [m], (..., m, 3); the entry point for a cable without a pulley.
+
+    The swivel angles of the pulleys belong to `pose`, which is one pose or a batch, and to `exits` as in `outward`.
+    `angle` (..., m) [rad] is the position on the pulley: 0 at the entry point, and the wrap angle at the exit point.
+    """
+    radius, (entry, axis, _) = pulley_radius(robot), cable_ends(robot, pose)
+    away = outward(robot, pose, exits) * (radius * (1.0 - np.cos(angle)))[..., None]
+    return np.asarray(entry + (away + axis * (radius * np.sin(angle))[..., None]))
+
+
+def pulley_centers(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
+    """Centers of the pulleys [m], shape (m, 3); the distance from the entry point is the pulley radius."""
+    return locked(cable_ends(robot, pose).entry + pulley_radius(robot)[:, None] * outward(robot, pose, exits))
 
 
 def dead_cable(robot: Robots, name: Literal["dead_cable", "dead_rise"] = "dead_cable") -> Array:

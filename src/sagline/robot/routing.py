@@ -66,7 +66,7 @@ class _ExitState:
         self.weight = material.linear_density[cable] * robot.gravity * exact
         self.wrap, self.entry = contact.wrap_angle[known], winches.swivel_axis[cable, 2]
         self.sine, self.radius = np.sin(self.wrap), winches.pulley_radius[cable]
-        across = self.sine[:, None] * outward(robot, state.pose)[known]
+        across = self.sine[:, None] * outward(robot, state.pose)[known][:, :2]
         self.tangent = np.concatenate((across, (self.entry * np.cos(self.wrap))[:, None]), axis=-1)
         sign = np.zeros(self.wrap.shape) if contact.winding is None else contact.winding[known]
         self.friction = sign * winches.pulley_friction[cable]

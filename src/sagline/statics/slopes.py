@@ -121,7 +121,11 @@ def motions_of_ends(levers: Array) -> Array:
 def platform_end_forces(state: Equilibrium) -> Array:
     """Forces (..., m, 3) on the cables at their platform ends, world axes [N]."""
     azimuth = None if state.contact is None else state.contact.azimuth
-    level = outward(state.robot, state.pose) if azimuth is None else np.stack((np.cos(azimuth), np.sin(azimuth)), -1)
+    level = (
+        outward(state.robot, state.pose)[..., :2]
+        if azimuth is None
+        else np.stack((np.cos(azimuth), np.sin(azimuth)), -1)
+    )
     sideways = level * state.cables.horizontal_tension[..., None]
     return np.concatenate((sideways, state.cables.vertical_force[..., None]), axis=-1)
 

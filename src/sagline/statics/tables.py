@@ -10,7 +10,16 @@ from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
-from sagline.robot.batch import Robots, first_of, has_slanted_axes, on_platform, pulleys_of, refuse_slanted
+from sagline.robot.batch import (
+    Robots,
+    cable_ends,
+    first_of,
+    has_slanted_axes,
+    on_platform,
+    pulley_radius,
+    pulleys_of,
+    refuse_slanted,
+)
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -26,9 +35,14 @@ def cable_table(robot: Robots, slanted: bool = False) -> Array:
     return locked(np.array([_cable_rows(one, pulleys_of(one)) for one in robots]))
 
 
+def has_pulley_model(robot: Robots, model: CableModel) -> bool:
+    """True for a cable model with the pulleys of a robot: with those of `has_slanted_axes`, exact or weightless."""
+    return model.code in (codes.CATENARY, codes.ELASTIC) or not has_slanted_axes(robot)
+
+
 def check_slanted(robot: Robots, model: CableModel) -> None:
-    """Refuse cable models other than the exact and the weightless one with pulleys of `has_slanted_axes`."""
-    if model.code not in (codes.CATENARY, codes.ELASTIC) and has_slanted_axes(robot):
+    """Refuse a cable model without the pulleys of a robot."""
+    if not has_pulley_model(robot, model):
         step = "Use the default model; the others have vertical swivel axes at the frame only."
         raise InvalidValueError("model", type(model).__name__, "Catenary or Elastic for such swivel axes", step)
 
@@ -129,10 +143,12 @@ def has_chords(robot: Robot, pose: Pose) -> Flags:
 
 def touching_angle(robot: Robot, pose: Pose) -> Array:
     """Wrap angles psi (m,) [rad] of straight cables, which are tangents between platform ends and pulleys."""
-    radius, entry = pulleys_of(robot)
-    geometry = chord_geometry(robot, pose)[0]
-    angle = np.arctan2(geometry[rows.COSINE], entry * geometry[rows.SINE])
-    return np.where(radius > 0.0, angle, 0.0)
+    geometry, axis = chord_geometry(robot, pose, slanted=True)[0], cable_ends(robot, pose).axis
+    level = geometry[[rows.AZIMUTH_X, rows.AZIMUTH_Y]] * geometry[rows.COSINE]
+    tangent = np.vstack((level, geometry[rows.SINE])).T  # from the exit point along the cable
+    along = (tangent * axis).sum(axis=1)
+    across = np.linalg.norm(tangent - along[:, None] * axis, axis=1)
+    return np.where(pulley_radius(robot) > 0.0, np.arctan2(across, along), 0.0)
 
 
 def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = None) -> None:

@@ -16,6 +16,7 @@ from sagline.kinematics.inverse_rows import Given
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
+from sagline.statics.tables import has_pulley_model
 from sagline.tension.method import TensionMethod
 from sagline.viewer import readout
 from sagline.viewer.feature import View
@@ -146,7 +147,8 @@ class ControlPanel:
             self._density = self._add_factor("Cable density ×", 0.1, 10.0, "Factor on the cables' mass per length.")
             self._stiffness = self._add_factor("Cable stiffness ×", 0.1, 10.0, "Factor on the cables' EA.")
             hint = "With an approximate model, the orange platform shows the pose of equilibrium."
-            self._model = gui.add_dropdown("Cable model", tuple(MODELS), hint=hint)
+            models = [name for name, model in MODELS.items() if has_pulley_model(robot, model)]
+            self._model = gui.add_dropdown("Cable model", models, hint=hint)
             self.method: Any = gui.add_dropdown("Tensions", tuple(METHODS), hint="Tension distribution method.")
             hint = "The tensions depend on earlier poses; start again from this pose."
             self._forgetting = gui.add_button("Reset history", icon=viser.Icon.ERASER, visible=False, hint=hint)

@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
-from sagline.robot.batch import dead_cable, pulleys_of
+from sagline.robot.batch import dead_cable, pulley_radius
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import touching_angle
@@ -51,25 +51,25 @@ class InMotion:
         return html_block(pose_line(self.pose) + cable_table_html(self.heads, self.columns, scale.colors(self.tension)))
 
     def courses(self, sag_scale: float) -> Array:
-        """Points of the cables from frame anchor to platform end (m, P, 3), NaN between pieces of a broken cable."""
+        """Points of the cables from pulley to the other end (m, P, 3), NaN between pieces of a broken cable."""
         if self.nodes is not None:
             return shapes.resampled(self.nodes, shapes.points_per_cable(self.robot))
         # catenaries with the cables' lengths; the exit points are the same as for chords
         robot, pose = self.robot, self.pose
-        wraps = shapes.wraps(robot, pose, None)
-        ends = shapes.chords(robot, pose, wraps[:, -1])
+        ends = shapes.chords(robot, pose, shapes.wraps(robot, pose)[:, -1])
         run = ends[:, 1] - ends[:, 0]
         span, rise = np.hypot(run[:, 0], run[:, 1]), run[:, 2]
-        wrapped = np.zeros_like(span)
-        if wraps.shape[1] > 1:
-            wrapped = pulleys_of(robot).radius * np.nan_to_num(touching_angle(robot, pose))
+        wrapped = pulley_radius(robot) * np.nan_to_num(touching_angle(robot, pose))
         length = self.length - wrapped - dead_cable(robot)
         length = np.where(length > 0.0, length, np.hypot(span, rise))
         cables = Catenary().from_length(robot.cables, span, rise, length, robot.gravity)
-        free = shapes.catenaries(ends, cables, sag_scale)
-        courses = free if wraps.shape[1] == 1 else np.concatenate((wraps, free), axis=1)
-        courses[self.broken] = robot.frame_anchors[self.broken, None]  # a broken cable without mass is drawn as a point
+        courses = shapes.courses(robot, pose, None, sag_scale, cables)
+        courses[self.broken] = courses[self.broken, :1]  # a broken cable without mass is drawn as a point
         return courses
+
+    def wheels(self) -> tuple[Array, Array]:
+        """Centers (m, 3) [m] and quaternions (m, 4) of the pulleys."""
+        return shapes.wheels(self.robot, self.pose, None, self.length)
 
 
 Configuration: TypeAlias = Snapshot | InMotion

@@ -12,8 +12,9 @@ import numpy as np
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.dynamics.vibration.vibration import MASSLESS
+from sagline.kinematics.slanted import with_eyelets
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.batch import pulleys_of
+from sagline.robot.batch import pulley_radius
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
@@ -166,7 +167,7 @@ def _summary(state: Equilibrium, error: Array | None) -> str:
         text = f"from the balance of {state.one_robot.cable_count} cables; only the position is given"
         rows.append(("Rotation", text))
     else:
-        extra = unit.written(float(capacity_margin(state)))
+        extra = unit.written(float(capacity_margin(with_eyelets(state))))
         rows.append(("Spare force", f"{extra} more in any direction, no moment; redistributed tensions"))
     if error is not None:
         away = float(np.linalg.norm(error))
@@ -221,7 +222,7 @@ def _cable_numbers(robot: Robot, state: Equilibrium | None, scale: TensionScale)
         "sag<br>[mm]": (sag, ".1f"),
         f"to limit<br>[{unit.name}]": (margin / unit.newtons, unit.form),
     }
-    radius, contact = pulleys_of(robot).radius, None if state is None else state.contact
+    radius, contact = pulley_radius(robot), None if state is None else state.contact
     if radius.any():
         angle = unknown if contact is None else np.degrees(contact.wrap_angle)
         columns["wrap<br>[°]"] = np.where(radius > 0.0, angle, np.nan), ".1f"
@@ -238,7 +239,7 @@ def _pulley_line(robot: Robot) -> str:
     if winches.dead_cable.any():
         text += f", dead cable {_span(winches.dead_cable, 'm')}"
     if not dead_runs(robot)[1].all():
-        text += ", drawn vertically over its known height; its path is not known"
+        text += ", drawn along the swivel axis; its path is not known"
     return text + "</div>"
 
 

@@ -10,7 +10,7 @@ import viser
 
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
-from sagline.robot.batch import pulleys_of
+from sagline.robot.batch import on_platform, pulley_radius
 from sagline.robot.checks import ROTATING
 from sagline.robot.pose import Pose, unit
 from sagline.robot.reach import is_underconstrained
@@ -128,14 +128,15 @@ class RobotScene:
         self._build_lights()
         self._low, self._high = shapes.bounds(robot)
         self._size = shapes.size_of(robot)
-        self._winches = Solid.winches(robot)
+        self._winches = self._build_winches("", robot, aboard=False)
         self._build_surroundings(robot)
         body = self._body = Solid.platform(robot)
         # transform controls of the platform, which are only a frame in a scene for pictures
         frame: Any = None if live else scene.add_frame("/platform", show_axes=False)
         self.gizmo: viser.TransformControlsHandle = self._build_gizmo(robot, body) if live else frame
         self._platform = self._nodes.mesh("/platform/body", *body, PLATFORM)
-        self._over_pulleys = pulleys_of(robot).radius > 0.0
+        self._build_winches("/platform/body", robot, aboard=True)
+        self._over_pulleys = pulley_radius(robot) > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
         above = 0.0, 0.0, 0.13 * self._size
         self._notice = scene.add_label("/platform/notice", "", position=above, visible=False, anchor="bottom-center")
@@ -179,8 +180,8 @@ class RobotScene:
         nodes, points = self._nodes, cable_segments(snapshot, sag_scale)
         self._cables = nodes.lines("/cables", points, cable_colors(snapshot, scale), CABLE_WIDTH)
         if self._wheels is not None:
-            turns = shapes.pulley_rotations(snapshot.robot, snapshot.pose)[self._over_pulleys]
-            self._wheels.batched_wxyzs = turns.astype(np.float32)
+            centers, turns = (each[self._over_pulleys].astype(np.float32) for each in snapshot.wheels())
+            self._wheels.batched_positions, self._wheels.batched_wxyzs = centers, turns
         self._platform.color = PLATFORM if snapshot.solved else INFEASIBLE
         self._notice.visible = self._live and not snapshot.solved
         if isinstance(snapshot, Snapshot) and not snapshot.solved:
@@ -226,9 +227,6 @@ class RobotScene:
     def _build_surroundings(self, robot: Robot) -> None:
         nodes = self._nodes
         nodes.mesh("/frame", *Solid.frame(robot), STEEL)
-        if len(self._winches.faces):
-            nodes.mesh("/winches", *self._winches, DRUM)
-        self._build_dead_cables(robot)
         width, depth = 1.5 * (self._high - self._low)[:2]
         cell = shapes.round_below(self._size / 10.0)
         middle = 0.5 * (self._low + self._high)
@@ -246,20 +244,23 @@ class RobotScene:
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
         """Draw pulleys in their real size; they swivel with the platform."""
         wheel, which = Solid.wheel(), self._over_pulleys
+        centers, turns = (each[which] for each in shapes.wheels(robot, pose))
         return self._scene.add_batched_meshes_simple(
-            "/pulleys", wheel.vertices, wheel.faces, shapes.pulley_rotations(robot, pose)[which],
-            robot.frame_anchors[which],
-            batched_scales=pulleys_of(robot).radius[which], batched_colors=DRUM, flat_shading=True, lod="off",
+            "/pulleys", wheel.vertices, wheel.faces, turns, centers,
+            batched_scales=pulley_radius(robot)[which], batched_colors=DRUM, flat_shading=True, lod="off",
         )  # fmt: skip
 
-    def _build_dead_cables(self, robot: Robot) -> None:
-        """Draw dead lengths; they are dashed if only their rise is known."""
-        runs, upright = shapes.dead_runs(robot)
-        for name, which in (("/dead", upright), ("/dead_assumed", ~upright)):
-            shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
-            if len(shown):
-                pieces = shapes.segments(shapes.straight(shown), dashed=name != "/dead")
-                self._nodes.lines(name, pieces, STEEL, GHOST_WIDTH)
+    def _build_winches(self, parent: str, robot: Robot, *, aboard: bool) -> Solid:
+        """Draw drums and dead lengths of the frame or of the platform; dead lengths of unknown paths are dashed."""
+        drums, (runs, known) = Solid.winches(robot, aboard=aboard), shapes.dead_runs(robot)
+        if len(drums.faces):
+            self._nodes.mesh(f"{parent}/winches", *drums, DRUM)
+        drawn = (on_platform(robot) == aboard) & (runs[:, 0] != runs[:, 1]).any(axis=1)
+        for name, which in (("dead", known), ("dead_assumed", ~known)):
+            if (shown := runs[which & drawn]).size:
+                pieces = shapes.segments(shapes.straight(shown), dashed=name != "dead")
+                self._nodes.lines(f"{parent}/{name}", pieces, STEEL, GHOST_WIDTH)
+        return drums
 
     def _build_axes(self) -> None:
         """Draw world axes at a corner of the floor, with a round length as the scale."""

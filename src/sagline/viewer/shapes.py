@@ -13,7 +13,15 @@ from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableState
 from sagline.core.arrays import Array, Indices, locked
-from sagline.robot.batch import outward, points_on_pulleys, pulleys_of
+from sagline.robot.batch import (
+    cable_ends,
+    dead_cable,
+    on_platform,
+    outward,
+    points_on_pulleys,
+    pulley_centers,
+    pulley_radius,
+)
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds as bounds
@@ -26,50 +34,76 @@ _UPRIGHT = 1e-6  # largest difference of a vertical dead length from its rise, r
 
 
 def points_per_cable(robot: Robot) -> int:
-    """Number of points of a cable, from its frame anchor to its platform end."""
-    return POINTS + WRAP_POINTS * bool(pulleys_of(robot).radius.any())
+    """Number of points of a cable, from the entry of its pulley to its other end."""
+    return POINTS + WRAP_POINTS * bool(robot.winches is not None and robot.winches.pulley_radius.any())
 
 
-def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
-    """Points of the cables from frame anchors over pulleys to exit points [m], (m, WRAP_POINTS, 3)."""
-    # shape (m, 1, 3), the frame anchors, if no cable has a pulley
-    if not pulleys_of(robot).radius.any():
-        return robot.frame_anchors[:, None]
-    angle = np.nan_to_num(touching_angle(robot, pose)) if wrap_angle is None else wrap_angle
-    return np.swapaxes(points_on_pulleys(robot, pose, np.linspace(0.0, 1.0, WRAP_POINTS)[:, None] * angle), 0, 1)
+def exits_of(state: Equilibrium | None) -> Array | None:
+    """Exit points (m, 3) [m] that determine the planes of the pulleys; None if their axes determine these planes."""
+    return None if state is None or state.contact is None or state.contact.azimuth is None else state.exit_point
+
+
+def wraps(robot: Robot, pose: Pose, state: Equilibrium | None = None) -> Array:
+    """Points of the cables from their entry points over pulleys to exit points [m], (m, WRAP_POINTS, 3)."""
+    # in the equilibrium `state`, or for straight cables; shape (m, 1, 3), the entry points, if no cable has a pulley
+    if robot.winches is None or not robot.winches.pulley_radius.any():
+        return cable_ends(robot, pose).entry[:, None]
+    contact = None if state is None else state.contact
+    angle = np.nan_to_num(touching_angle(robot, pose)) if contact is None else contact.wrap_angle
+    angles = np.linspace(0.0, 1.0, WRAP_POINTS)[:, None] * angle
+    return np.swapaxes(points_on_pulleys(robot, pose, angles, exits_of(state)), 0, 1)
 
 
 def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
-    """Both ends of every free cable in the world [m], shape (m, 2, 3): `exits` or frame anchor, then platform end."""
-    platform_ends = pose.transform(robot.platform_anchors)
-    return locked(np.stack((robot.frame_anchors if exits is None else exits, platform_ends), axis=1))
+    """Both ends of every free cable in the world [m], shape (m, 2, 3): frame end, then platform end."""
+    # `exits`: exit points of the pulleys, or None for cables from anchor to anchor
+    entry, _, other = cable_ends(robot, pose)
+    ends = np.stack((entry if exits is None else exits, other), axis=1)
+    return locked(np.where(on_platform(robot)[:, None, None], ends[:, ::-1], ends))
+
+
+def in_world(robot: Robot, pose: Pose, points: Array) -> Array:
+    """World coordinates of `points` (m, P, 3) in the axes of the winches, which are at the frame or on the platform."""
+    return np.where(on_platform(robot)[:, None, None], pose.transform(points), points)
+
+
+def _winch_ends(robot: Robot) -> tuple[Array, Array]:
+    """Entry points [m] and unit vectors along the dead lengths there, in the axes of the winches, (m, 3) each."""
+    entry, axis, _ = cable_ends(robot, Pose(np.zeros(3), np.eye(3)))
+    slanted = np.zeros(robot.cable_count, dtype=bool) if robot.winches is None else robot.winches.slanted
+    return entry, np.where(slanted[:, None], axis, [0.0, 0.0, 1.0])  # the axis of an eyelet has no effect
 
 
 def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
-    """Dead lengths as vertical lines below the frame anchors; their paths are not known, only lengths and rises."""
-    # returns frame anchors, and the points below them at the distance of the rises [m], shape (m, 2, 3); and True for
-    # each dead length that is vertical, because its length is equal to its rise, shape (m,)
-    winches, low, upright = robot.winches, robot.frame_anchors.copy(), np.ones(robot.cable_count, dtype=bool)
-    if winches is not None:
-        low[:, 2] -= winches.dead_rise
-        upright = winches.dead_cable - np.abs(winches.dead_rise) <= _UPRIGHT * winches.dead_cable
-    return np.stack((robot.frame_anchors, low), axis=1), upright
+    """Dead lengths as lines along the swivel axes; below a vertical pulley at the frame only the rise is known."""
+    # Returns entry points, and the other ends of the lines [m], in the axes of the winches, shape (m, 2, 3); and True
+    # for each line that has the dead length and the rise, shape (m,). The paths of the others are not known.
+    winches, (entry, along) = robot.winches, _winch_ends(robot)
+    if winches is None:
+        return np.stack((entry, entry), axis=1), np.ones(robot.cable_count, dtype=bool)
+    length = np.where(winches.slanted, winches.dead_cable, winches.dead_rise)
+    run, known = length[:, None] * along, winches.dead_cable - np.abs(length)
+    known = known + np.where(winches.on_platform, 0.0, np.abs(run[:, 2] - winches.dead_rise))
+    return np.stack((entry, entry - run), axis=1), known <= _UPRIGHT * winches.dead_cable
 
 
 def drum_axes(robot: Robot) -> Array:
-    """Ends of the axes of the drums with known radii [m], shape (k, 2, 3)."""
-    # a drum touches the lower end of its dead length on the side away from the robot's middle; its axis is horizontal
+    """Ends of the axes of the drums with known radii [m], in the axes of the winches, shape (k, 2, 3)."""
+    # A drum touches the end of its dead length, and its axis is horizontal. The drum is on the side away from the
+    # middle of the anchors if the dead length is vertical, otherwise below it.
     winches = robot.winches
     if winches is None or winches.drum_radius is None:
         return np.empty((0, 2, 3))
-    feet, middle = dead_runs(robot)[0][:, 1], robot.frame_anchors.mean(axis=0)
-    away = (feet - middle)[:, :2]
+    feet, (entry, along) = dead_runs(robot)[0][:, 1], _winch_ends(robot)
+    middle = np.where(winches.on_platform[:, None], robot.platform_anchors.mean(axis=0), entry.mean(axis=0))
+    upright = ~along[:, :2].any(axis=1, keepdims=True)
+    away = np.where(upright, (feet - middle) * [1.0, 1.0, 0.0], [0.0, 0.0, -1.0])
+    away -= along * (away * along).sum(axis=1, keepdims=True)
     length = np.linalg.norm(away, axis=1, keepdims=True)
-    away = np.where(length > 0.0, away / np.where(length > 0.0, length, 1.0), [1.0, 0.0])
-    flat = np.zeros((len(feet), 1))
-    centers = feet + winches.drum_radius[:, None] * np.hstack((away, flat))
+    away = np.where(length > 0.0, away / np.where(length > 0.0, length, 1.0), [1.0, 0.0, 0.0])
+    centers = feet + winches.drum_radius[:, None] * away
     width = winches.drum_radius if winches.drum_width is None else winches.drum_width
-    half = 0.5 * width[:, None] * np.hstack((-away[:, 1:], away[:, :1], flat))
+    half = 0.5 * width[:, None] * np.cross(along, away)
     return np.stack((centers - half, centers + half), axis=1)
 
 
@@ -91,13 +125,16 @@ def catenaries(ends: Array, cables: CableState, sag_scale: float) -> Array:
     return np.asarray(ends[:, :1] + np.concatenate((level[:, None] * along[..., None], height[..., None]), axis=-1))
 
 
-def courses(robot: Robot, pose: Pose, state: Equilibrium | None, sag_scale: float) -> Array:
-    """Points of the cables from frame anchor over pulley to platform end [m], shape (m, points_per_cable, 3)."""
-    # in an equilibrium the free cables are catenaries with their sag scaled by a factor; otherwise they are straight
-    contact = None if state is None else state.contact
-    wrapped = wraps(robot, pose, None if contact is None else contact.wrap_angle)
+def courses(
+    robot: Robot, pose: Pose, state: Equilibrium | None, sag_scale: float, cables: CableState | None = None
+) -> Array:
+    """Points of the cables from the entry of the pulley to the other end [m], shape (m, points_per_cable, 3)."""
+    # In an equilibrium the free cables are catenaries with their sag scaled by a factor. Otherwise they leave their
+    # pulleys along the chords, as catenaries with the states `cables`, or straight.
+    cables, wrapped = cables if state is None else state.cables, wraps(robot, pose, state)
     ends = chords(robot, pose, wrapped[:, -1])
-    free = straight(ends) if state is None else catenaries(ends, state.cables, sag_scale)
+    free = straight(ends) if cables is None else catenaries(ends, cables, sag_scale)
+    free = np.where(on_platform(robot)[:, None, None], free[:, ::-1], free)
     return free if wrapped.shape[1] == 1 else np.concatenate((wrapped, free), axis=1)
 
 
@@ -149,15 +186,15 @@ class Solid(NamedTuple):
         return _merged([beam for a, b in BOX_EDGES for beam in _beams(corners[a], corners[b], thick, dash)])
 
     @classmethod
-    def winches(cls, robot: Robot) -> Solid:
-        """Known drums, and a mark at every frame anchor without a visible pulley."""
-        radius = _WINCH * size_of(robot)
-        marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
+    def winches(cls, robot: Robot, *, aboard: bool = False) -> Solid:
+        """Known drums of the frame, with a mark at every anchor without a visible pulley, or those of the platform."""
+        radius, own = _WINCH * size_of(robot), on_platform(robot) == aboard
+        marked = robot.frame_anchors[own & (pulley_radius(robot) < radius) & (not aboard)]
         up = np.array([0.0, 0.0, radius])
         parts = [cls.rod(np.stack((place - up, place + up)), radius) for place in np.unique(marked, axis=0)]
         known = None if robot.winches is None else robot.winches.drum_radius
         if known is not None:
-            parts += [cls.rod(ends, thick) for ends, thick in zip(drum_axes(robot), known, strict=True)]
+            parts += [cls.rod(ends, thick) for ends, thick in zip(drum_axes(robot)[own], known[own], strict=True)]
         return _merged(parts) if parts else cls(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 
     @staticmethod
@@ -179,7 +216,7 @@ class Solid(NamedTuple):
 
     @classmethod
     def wheel(cls) -> Solid:
-        """A pulley of radius 1 for a cable along x that enters at the origin; its middle is at x = 1."""
+        """A pulley of radius 1 in the plane of x and z; its center is the origin."""
         from trimesh.creation import annulus  # an optional dependency that figures do not require
 
         rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
@@ -189,7 +226,7 @@ class Solid(NamedTuple):
         corners = [Solid(ring, np.arange(len(ring)).reshape(-1, 3)) for ring in (rim, hub)]
         lying = _merged([*corners, *spokes])
         x, y, z = lying.vertices.T
-        return cls(np.stack((1.0 + x, -z, y), axis=1), lying.faces)
+        return cls(np.stack((x, -z, y), axis=1), lying.faces)
 
     @staticmethod
     def rod(ends: Array, radius: float) -> Solid:
@@ -288,11 +325,21 @@ def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
     return [_cuboid(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
 
 
-def pulley_rotations(robot: Robot, pose: Pose) -> Array:
-    """Rotations of the pulleys about the vertical, quaternions, scalar first, shape (m, 4)."""
-    half = 0.5 * np.arctan2(*outward(robot, pose).T[::-1])
-    zero = np.zeros_like(half)
-    return np.stack((np.cos(half), zero, zero, np.sin(half)), axis=1)
+def wheels(
+    robot: Robot, pose: Pose, state: Equilibrium | None = None, length: Array | None = None
+) -> tuple[Array, Array]:
+    """Centers (m, 3) [m] and rotations of the pulleys, quaternions, scalar first, shape (m, 4)."""
+    # A wheel is in the plane of swivel axis and cable: x points from the axis to its center, z along the axis. It turns
+    # as cable passes over it, at the unstrained lengths `length` (m,) [m] off the drums.
+    exits, radius = exits_of(state), pulley_radius(robot)
+    axis, away = cable_ends(robot, pose).axis, outward(robot, pose, exits)
+    lost = ~away.any(axis=1)  # a cable along its axis, or an eyelet there
+    away[lost] = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])[lost]
+    swivel = Rotation.from_matrix(np.stack((away, np.cross(axis, away), axis), axis=2))
+    passed = np.zeros_like(radius) if length is None else np.nan_to_num(length - dead_cable(robot))
+    angle = np.divide(passed, radius, out=np.zeros_like(radius), where=radius > 0.0)
+    turned = swivel * Rotation.from_rotvec(angle[:, None] * [0.0, 1.0, 0.0])
+    return pulley_centers(robot, pose, exits), turned.as_quat(scalar_first=True)
 
 
 def _cuboid(middle: Array, edges: Array) -> Solid:

@@ -167,6 +167,11 @@ class Snapshot:
         state = self.plan.state if self.plan is not None and self.feasible else None
         return shapes.courses(self.robot, self.pose, state, sag_scale)
 
+    def wheels(self) -> tuple[Array, Array]:
+        """Centers (m, 3) [m] and quaternions (m, 4) of the pulleys."""
+        state = self.plan.state if self.plan is not None and self.feasible else None
+        return shapes.wheels(self.robot, self.pose, state, None if state is None else state.unstrained_length)
+
 
 def snapshot_at(
     robot: Robot, pose: Pose, settings: Settings, previous: Plan | None, wrench: Array | None = None

@@ -16,7 +16,7 @@ import viser
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.writing import file_stem
-from sagline.robot.batch import pulleys_of
+from sagline.robot.batch import on_platform, pulley_radius
 from sagline.viewer import shapes
 from sagline.viewer.camera import Camera
 from sagline.viewer.feature import Feature, View
@@ -131,19 +131,19 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     place = np.eye(4)
     place[:3, :3], place[:3, 3] = snapshot.pose.matrix, snapshot.pose.position
     _add(scene, "frame", shapes.Solid.frame(robot), STEEL)
-    winches = shapes.Solid.winches(robot)
-    if len(winches.faces):
-        _add(scene, "winches", winches, DRUM)
-    pulleys = zip(pulleys_of(robot).radius, shapes.pulley_rotations(robot, snapshot.pose), strict=True)
-    for i, (radius, turn) in enumerate(pulleys):
+    for name, aboard in (("winches", False), ("winches on the platform", True)):
+        winches = shapes.Solid.winches(robot, aboard=aboard)
+        if len(winches.faces):
+            _add(scene, name, winches, DRUM, place if aboard else None)
+    for i, (radius, center, turn) in enumerate(zip(pulley_radius(robot), *snapshot.wheels(), strict=True)):
         if radius > 0.0:
-            placed = compose_matrix(scale=np.full(3, radius), translate=robot.frame_anchors[i])
+            placed = compose_matrix(scale=np.full(3, radius), translate=center)
             _add(scene, f"pulley {i}", shapes.Solid.wheel(), DRUM, placed @ quaternion_matrix(turn))
-    thin = _DEAD_RADIUS * shapes.size_of(robot)
+    thin, with_platform = _DEAD_RADIUS * shapes.size_of(robot), on_platform(robot)
     for i, (run, known) in enumerate(zip(*shapes.dead_runs(robot), strict=True)):
-        if run[0, 2] != run[1, 2]:
+        if (run[0] != run[1]).any():
             name = f"dead length {i}" if known else f"dead length {i}, path not known"
-            _add(scene, name, shapes.Solid.rod(run, thin), STEEL)
+            _add(scene, name, shapes.Solid.rod(run, thin), STEEL, place if with_platform[i] else None)
     _add(scene, "platform", shapes.Solid.platform(robot), PLATFORM if snapshot.solved else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
     for i, course in enumerate(snapshot.courses(sag_scale)):

@@ -15,7 +15,9 @@ from sagline.core.errors import SaglineError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.batch import on_platform
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.tension.margin import unresisted_motion
 from sagline.viewer import shapes
@@ -61,6 +63,11 @@ def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array 
             there = Pose.from_quaternion(found, start.quaternion)
             return NearestFeasible(there, float(np.linalg.norm(found - pose.position)), turned)
     return None
+
+
+def _has_levels(robot: Robot) -> bool:
+    """True if the workspace of a robot can be computed."""
+    return not is_underconstrained(robot) or not on_platform(robot).any()
 
 
 def _nearest_position(
@@ -128,6 +135,8 @@ def explanation(
         button = f"<button {chosen_by(GO, '')}>Go there</button>"
         level = ", the platform level" if nearest.turned else ""
         rows.append(("Nearest feasible", f"{n(nearest.distance, '.3g', 'm')} away at {place} m{level}. {button}"))
+    elif not _has_levels(snapshot.robot):
+        rows.append(("Nearest feasible", "not searched for few cables with winches on the platform"))
     elif searching:
         rows.append(("Nearest feasible", "searching …"))
     elif snapshot.status not in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED):
@@ -222,7 +231,7 @@ class MissingFeature(Feature):
         pose = snapshot.pose
         self._key = (id(snapshot.robot), type(model), pose.position.tobytes(), pose.quaternion.tobytes(), load)
         self._shown = snapshot, view
-        if not self._task.busy and self._nearest_key != self._key:
+        if _has_levels(snapshot.robot) and not self._task.busy and self._nearest_key != self._key:
             self._search()
         self._explain()
 

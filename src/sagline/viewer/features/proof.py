@@ -9,6 +9,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
+from sagline.kinematics.slanted import with_eyelets
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import platform_end_forces
 from sagline.viewer.feature import Feature, View
@@ -35,6 +36,7 @@ class _PlatformForce:
 
 def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tuple[_PlatformForce, ...]:
     """All forces on a platform: those of the cables in order of azimuth, then weight, load and missing force."""
+    load, state = state.wrench, with_eyelets(state)
     robot, pose = state.one_robot, state.pose
     center = pose.transform(robot.center_of_mass)
     ends = pose.transform(robot.platform_anchors)
@@ -42,10 +44,11 @@ def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tupl
     order = np.argsort(np.arctan2(pulls[:, 1], pulls[:, 0]), kind="stable").tolist()
     wrenches = np.hstack((pulls, np.cross(ends - center, pulls)))
     forces = [_PlatformForce(str(k), cable_color(k), wrenches[k], ends[k]) for k in order]
-    weight = np.array([0.0, 0.0, -robot.mass * robot.gravity, 0.0, 0.0, 0.0])
+    # the mass of a platform with winches includes the cable off their drums
+    weight = np.array([0.0, 0.0, -robot.mass * robot.gravity, 0.0, 0.0, 0.0]) + (state.wrench - load)
     forces.append(_PlatformForce(WEIGHT, WEIGHT_COLOR, weight, center))
     lacking = np.zeros(6) if missing is None else missing
-    for name, color, wrench in ((LOAD, LOAD_COLOR, state.wrench - lacking), (MISSING, INFEASIBLE, lacking)):
+    for name, color, wrench in ((LOAD, LOAD_COLOR, load - lacking), (MISSING, INFEASIBLE, lacking)):
         if np.linalg.norm(wrench) > 0.0:
             forces.append(_PlatformForce(name, color, wrench, center))
     return tuple(forces)

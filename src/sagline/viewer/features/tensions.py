@@ -11,6 +11,7 @@ import numpy as np
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kinematics.polygon import polygon_at, tension_polygon
+from sagline.kinematics.slanted import with_eyelets
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import MinimumNorm
 from sagline.tension.polygon import Side, TensionPolygon
@@ -175,6 +176,8 @@ def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
         return None
     robot, state = snapshot.robot, plan.state
     if snapshot.feasible:
+        state = with_eyelets(state)  # at constant exit points, as the sag forces are constant
+        robot = state.one_robot
         options = kernel_options(robot, state.cables.model, MinimumNorm())
         return polygon_at(robot, snapshot.pose, options, state.wrench, state.chord_tension, state.pull, feasible=True)
     try:
