@@ -12,6 +12,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import InvalidValueError, plot
+from sagline.plot.robot import strokes as lines_of
 from sagline.viewer.tension_scale import TensionScale
 from tests.refusal import refused
 from tests.tiers import extended, wide
@@ -113,3 +114,18 @@ def test_axes_of_the_caller_are_used_and_a_point_mass_has_no_faces() -> None:
     ax = Figure().add_subplot()
     assert plot.drawing(point, sl.Pose([0.0, 0.0, 1.0], np.eye(3)), ax=ax) is ax
     assert all(each.get_paths() for each in strokes(ax)[:3])
+
+
+def test_cables_of_winches_on_the_platform_begin_at_the_frame() -> None:
+    winches = sl.Winch(0.1, dead_cable=0.4, drum_radius=0.1, on_platform=[True, False] * 4)
+    robot, pose = sl.load_robot("cogiro").replace(winches=winches), sl.Pose.from_euler([1.0, 0.5, 2.0], 0.1, 0.0, 0.1)
+    plan = sl.inverse(robot, pose)
+    cables, others = lines_of(robot, pose, plan)
+    np.testing.assert_allclose([each.points[0] for each in cables], robot.frame_anchors, atol=1e-9)
+    ends = pose.transform(robot.platform_anchors)
+    np.testing.assert_allclose([each.points[-1] for each in cables], ends, atol=1e-9)
+    rims = np.array([each.points for each in others[:8]])  # of the pulleys, which contain the exit points
+    gaps = np.linalg.norm(rims - plan.exit_point[:, None], axis=2).min(axis=1)
+    assert gaps.max() < 0.1 * np.pi / 49.0
+    feet = [each.points[1] for each in others if len(each.points) == 2][:4]  # of the dead lengths on the platform
+    np.testing.assert_allclose(feet, pose.transform(robot.platform_anchors - [0.0, 0.0, 0.4])[::2], atol=1e-12)

@@ -23,7 +23,7 @@ from sagline.kinematics.plan import Plan
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import VERMILLION, color_bar, sheet
 from sagline.plot.style import current
-from sagline.robot.batch import points_on_pulleys, pulley_radius
+from sagline.robot.batch import on_platform, points_on_pulleys, pulley_radius
 from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.viewer import shapes
@@ -66,6 +66,8 @@ def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], 
     colors = TensionScale.of(robot).colors(tension) / 255.0
     style = (0, (3.0, 2.0)) if state is None else "-"
     courses = shapes.courses(robot, pose, state, 1.0)
+    aboard = on_platform(robot)[:, None, None]
+    courses = np.where(aboard, courses[:, ::-1], courses)  # from the frame, because numbers of cables are near it
     cables = [Stroke(*each, 1.3, style, 2.0, covers=True) for each in zip(courses, colors, strict=True)]
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     rims = np.swapaxes(points_on_pulleys(robot, pose, turn, shapes.exits_of(state)), 0, 1)
@@ -128,8 +130,8 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
     numbers at the frame. Pulleys are turned into the planes of their cables. Between drum and pulley, a cable is drawn
-    as a vertical line from one height to the other. The line is dotted if the true length differs. The ground with the
-    platform's shadow is at z = 0 or lower.
+    along the swivel axis; if this axis is vertical, from one height to the other. The line is dotted if the true length
+    or rise differs. The ground with the platform's shadow is at z = 0 or lower.
 
     Args:
         robot: The robot.
