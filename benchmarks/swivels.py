@@ -70,7 +70,6 @@ def calls(robot: sl.Robot) -> dict[str, Callable[[], object]]:
 def times() -> Iterator[Row]:
     """CoGiRo with pulleys of 50 mm radius and 3 m of dead length."""
     ready = {name: calls(robot) for name, robot in ROBOTS.items()}
-    del ready["platform"]["calibration of 100 poses with lengths and load cells"]  # not supported
     for quantity, target in TARGETS.items():
         best = {name: np.inf for name, each in ready.items() if quantity in each}
         for _ in range(REPEATS):

@@ -53,6 +53,11 @@ def robots() -> dict[str, sl.Robot]:
     axes = np.random.default_rng(5).normal(size=(8, 3))
     axes[0], axes[1] = [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]
     slanted = {"swivel_axis": axes / np.linalg.norm(axes, axis=1)[:, None]}
+    aboard: dict[str, Any] = {
+        "swivel_axis": axes[::-1],
+        "dead_cable": 0.4 * few,
+        "on_platform": [True] * 5 + [False] * 3,
+    }
     pulleys = sl.load_robot("ipanema-2")
     layers = {"drum_width": 0.08, "layers": 4, "drum_distance": 0.8, "drum_offset": -0.04, "cable_length": 34.0}
     cogiro = sl.load_robot("cogiro")
@@ -63,6 +68,7 @@ def robots() -> dict[str, sl.Robot]:
         "point": point(),
         "pulleys": pulleys.replace(winches=sl.Winch(0.25 * few, swivel_axis=swivel, **run, **cell)),
         "slanted": cogiro.replace(winches=sl.Winch(0.05 * few, **slanted, **run, **cell)),
+        "aboard": cogiro.replace(winches=sl.Winch(0.05 * few, **aboard, **cell)),
         "drums": with_drums(cogiro, winding_tension=160.0, **cell),
         "layers": with_drums(cogiro, pulley_radius=0.05 * few, winding_tension=40.0, **run, **layers),
     }

@@ -18,21 +18,21 @@ from tests.tiers import extended
 ROBOTS = robots()
 WITHOUT_WINCHES = ("cogiro", "article-suspended", "planar", "point")
 WITH: dict[str, tuple[str, ...]] = {
-    "pulley_radius": ("pulleys", "slanted", "layers"),
-    "dead_cable": ("pulleys", "slanted", "layers"),
+    "pulley_radius": ("pulleys", "slanted", "aboard", "layers"),
+    "dead_cable": ("pulleys", "slanted", "aboard", "layers"),
     "drum_radius": ("drums", "layers"),
     "length_scale": WITHOUT_WINCHES,
     "clock_offset": (),  # only moving rows observe it: test_clock_offset.py
     "swivel_zero": (),  # test_swivel.py
     "inertia": (),  # test_frequency.py
-    "load_cell_gain": ("pulleys", "slanted", "drums"),
-    "load_cell_bias": ("pulleys", "slanted", "drums"),
+    "load_cell_gain": ("pulleys", "slanted", "aboard", "drums"),
+    "load_cell_bias": ("pulleys", "slanted", "aboard", "drums"),
 }
 POSE_ONLY = ("measuring_frame", "target")
 CELL_ONLY = ("load_cell_gain", "load_cell_bias")
 LENGTH = 5e-4  # m
 FIRST = ("frame_anchors", "length_scale")
-OVER_PULLEYS = ("pulleys", "slanted", "layers")
+OVER_PULLEYS = ("pulleys", "slanted", "aboard", "layers")
 
 
 def cases(other_kinds: tuple[str, ...]) -> list[Any]:

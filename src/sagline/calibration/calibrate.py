@@ -117,7 +117,8 @@ def calibrate(
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
     model = model_of(model)
-    refuse_slanted(robot, only_platform=True)
+    if log.swivel is not None or model.code == codes.STRAIGHT:
+        refuse_slanted(robot, only_platform=True)
     _check_model(robot, model)
     _check_frequencies(robot, log)
     callback(progress, "progress")

@@ -151,7 +151,8 @@ class MachineTerms:
         swivel_zero: Array | float = 0.0,
     ) -> None:
         """Arrays of a robot and its sensors; raises an error if counts need drum data that are missing."""
-        refuse_slanted(robot, only_platform=True)
+        if sensors.swivel_deviation is not None:  # an angle about an axis that rotates with the platform
+            refuse_slanted(robot, only_platform=True)
         self.robot, self.model, given = robot, model, (offset, scale, late, swivel_zero)
         self.offset, self.scale, self.late, self.swivel_zero = (np.broadcast_to(x, robot.cable_count) for x in given)
         self.drums = Drums(robot) if parameters.counted else None

@@ -18,7 +18,7 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.robot.robot import Robot
-from sagline.statics.slopes import cable_slopes, on_platform
+from sagline.statics.slopes import cable_slopes, wrenches_by_length
 from sagline.statics.stiffness import stiffness
 
 
@@ -59,7 +59,7 @@ def cell_errors(robot: Robot) -> tuple[Array, Array]:
 def _balance_slope(state: Equilibrium) -> Array:
     """Derivatives of the wrench with respect to frame-end tensions if the platform is fixed, (..., n, m) [1, m]."""
     slopes = cable_slopes(state)
-    wrench = on_platform(slopes.by_length, slopes.levers) / slopes.tension_by_length[..., None, :]
+    wrench = wrenches_by_length(state, slopes) / slopes.tension_by_length[..., None, :]
     return np.asarray(-first_of(state.robot).freedom @ wrench)  # minus: these forces act on the cable
 
 

@@ -11,7 +11,6 @@ from sagline.core.arrays import Array, locked
 from sagline.core.results import Columns, Result, Tabular
 from sagline.kernels import codes
 from sagline.motion.path import Path
-from sagline.robot.batch import refuse_slanted
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import guide_forces, tension_after
 from sagline.robot.winch import Winch
@@ -25,13 +24,16 @@ class FrameForces(Result, Tabular):
 
     All forces are in world axes, shape (m, 3) or (N, m, 3), NaN without a solution. The sum of `pulley`, `winch` and
     `guides` of all cables is the external and inertial force on the platform plus the weight of platform and cables.
+    The mass of a platform with winches includes their cables.
 
     Attributes:
         state: Robot, poses and cables.
         path: The path of the plan; None for poses without times.
-        exit: Force of the free span on the frame at the exit point [N]: cable force at the frame end.
+        exit: Force of the free span on the frame at the exit point [N]: cable force at the frame end. With a winch on
+            the platform, this point is the frame anchor.
         pulley: Force on the axle of the pulley, on the eyelet or on the anchor [N]: free span, cable between pulley and
-            drum, and weight of the cable on the pulley. It is equal to `exit` if no cable continues behind the anchor.
+            drum, and weight of the cable on the pulley. It is equal to `exit` if the frame has no cable behind
+            the anchor.
         winch: Force on the winch [N]. Without `guides` in the robot's winches, it is the sum of the forces on winch
             and everything that guides the cable behind the pulley; zero if no cable continues behind the anchor.
         guides: Forces on the guides between winch and frame anchor [N], in the order of `Winch.guides` without the
@@ -80,20 +82,20 @@ def frame_forces_of(state: Equilibrium, path: Path | None) -> FrameForces:
     """Forces of the cables on the frame; see `Plan.frame_forces`."""
     from sagline.statics.slopes import frame_end_forces  # not needed for a plan alone
 
-    refuse_slanted(state.robot, only_platform=True)
     robot, contact, exit_force = state.one_robot, state.contact, frame_end_forces(state)
     winches = robot.winches
     guided = np.zeros((*exit_force.shape[:-1], 0, 3))
     if contact is None or winches is None:
         pulley, winch = exit_force, np.zeros(exit_force.shape)
     else:
-        on_pulley, behind = (each[..., None] * _UP for each in _weights(state))
+        at_frame = ~winches.on_platform
+        on_pulley, behind = ((each * at_frame)[..., None] * _UP for each in _weights(state))
         if winches.guides is not None:
             forces = guide_forces(state)
             pulley, winch = exit_force - on_pulley + forces[..., 0, :], forces[..., -1, :]
             guided = forces[..., -2:0:-1, :]
         else:
-            continues = (winches.pulley_radius > 0.0) | (winches.dead_cable > 0.0)
+            continues = ((winches.pulley_radius > 0.0) | (winches.dead_cable > 0.0)) & at_frame
             pull = np.where(continues, _entry_tension(state, winches), 0.0)[..., None] * winches.swivel_axis
             pulley, winch = exit_force - pull - on_pulley, pull - behind
     fields = (np.ascontiguousarray(each) for each in (exit_force, pulley, winch, guided))

@@ -99,9 +99,10 @@ def refuse_slanted(robot: Robots, *, only_platform: bool = False) -> None:
             cable = int(np.argmax(refused))
             if winches.on_platform[cable]:
                 step = (
-                    "On the platform: use inverse, forward, confirm, stiffness, modes, view, margin or workspace (not "
+                    "On the platform: use inverse, forward, confirm, stiffness, modes, linearized, calibrate, view, "
+                    "simulate (massless cables), margin or workspace (not with fewer cables than freedoms), without "
+                    "friction."
                 )
-                step += "with fewer cables than freedoms), without friction."
                 raise InvalidValueError(f"winches: on_platform[{cable}]", "true", "false here", step)
             shown = ", ".join(f"{x:.3g}" for x in winches.swivel_axis[cable])
             step = (
@@ -244,14 +245,18 @@ def dead_cable(robot: Robots, name: Literal["dead_cable", "dead_rise"] = "dead_c
 
 
 def drum_heights(robot: Robots, pose: Pose) -> Array:
-    """Heights of the drums [m], (..., m); a drum on the platform is on the swivel axis of its pulley."""
+    """Heights of the drums [m], (..., m)."""
+    (frame,) = robot_fields(robot, "frame_anchors")
+    turned = (drums_on_platform(robot) @ pose.matrix[..., 2, :, None])[..., 0]
+    at_frame = frame[..., 2] - dead_cable(robot, "dead_rise")
+    return np.where(on_platform(robot), pose.position[..., 2, None] + turned, at_frame)
+
+
+def drums_on_platform(robot: Robots) -> Array:
+    """Positions of drums on the platform in the platform frame [m], (m, 3) or (N, m, 3): on the swivel axes."""
 
     def own(one: Robot) -> tuple[Array, ...]:
-        frame, ends, winches = one.frame_anchors[:, 2], one.platform_anchors, one.winches
-        if winches is None:
-            return frame, ends
-        return frame - winches.dead_rise, ends - winches.dead_cable[:, None] * winches.swivel_axis
+        ends, winches = one.platform_anchors, one.winches
+        return (ends if winches is None else ends - winches.dead_cable[:, None] * winches.swivel_axis,)
 
-    at_frame, aboard = _each(robot, own)
-    turned = (aboard @ pose.matrix[..., 2, :, None])[..., 0]
-    return np.where(on_platform(robot), pose.position[..., 2, None] + turned, at_frame)
+    return _each(robot, own)[0]

@@ -12,7 +12,8 @@ from sagline.kernels import tables
 from sagline.kernels.cable import swivel
 from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for
-from sagline.robot.batch import has_routing, outward, refuse_slanted
+from sagline.robot import batch
+from sagline.robot.batch import has_routing, outward
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import kernel_length
 from sagline.statics.tables import pose_rows, robot_terms
@@ -95,8 +96,6 @@ def stiffness_and_levers(state: Equilibrium) -> tuple[Array, Array]:
 
 def cable_slopes(state: Equilibrium) -> CableSlopes:
     """Derivatives of the cable forces by platform motion, by cable length and by cable data."""
-    # with the pulley on the platform, a force at the platform end is not the whole effect of a cable
-    refuse_slanted(state.robot, only_platform=True)
     matrix, stiffness, slopes, levers, force, tensions = (
         array.reshape(*state.pose.shape, *array.shape[1:]) for array in KernelStates.of(state).describe().found
     )
@@ -109,6 +108,21 @@ def on_platform(forces: Array, levers: Array) -> Array:
     """Wrenches (..., 6, m) of forces at the platform ends about the center of mass."""
     # forces: (..., m, 3) [N]; levers: vectors from the center of mass to the platform ends, (..., m, 3) [m].
     return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
+
+
+def wrenches_by_length(state: Equilibrium, slopes: CableSlopes) -> Array:
+    """Derivatives of the unbalance by the lengths of the cables, at a fixed pose, shape (..., 6, m) [N/m, N]."""
+    found, aboard = on_platform(slopes.by_length, slopes.levers), batch.on_platform(state.robot)
+    if not aboard.any():
+        return found
+    # Drum D on the platform: dU/dL = -(T + T^2/(2 EA) + w (z_D - z_B)), with the tension T at the frame anchor B.
+    cables, (center,) = state.cables, batch.robot_fields(state.robot, "center_of_mass")
+    drums = (batch.drums_on_platform(state.robot) - center[..., None, :]) @ np.swapaxes(state.pose.matrix, -1, -2)
+    weight = 0.0 if cables.model.weightless else cables.cable.linear_density * cables.gravity
+    strained = 1.0 + cables.frame_end_tension / cables.cable.axial_stiffness
+    lifted = np.asarray(weight)[..., None] * motions_of_ends(drums)[..., 2, :]
+    energy = strained[..., None] * slopes.tension_by_motion + lifted
+    return np.where(aboard[..., None, :], -np.swapaxes(energy, -1, -2), found)
 
 
 def motions_of_ends(levers: Array) -> Array:

@@ -19,7 +19,7 @@ from sagline.kernels.dynamics import motion
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.drives import BIN
-from sagline.robot.batch import has_routing, refuse_slanted
+from sagline.robot.batch import has_routing, on_platform
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
@@ -61,7 +61,6 @@ class Plant:
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
         """Create the state of `robot` at `pose`; `twist` (6,); `length` (m,) [m]; `data` (DATA_ROWS, m)."""
-        refuse_slanted(robot, only_platform=True)
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data  # the robot at the start
         moments, self.axes = _principal_axes(robot, pose)  # principal axes in the platform frame, one per column
@@ -73,6 +72,9 @@ class Plant:
         self._table = cable_table(robot, slanted=True)[0].copy()
         anchors = slice(tables.PLATFORM_X, tables.PLATFORM_Z + 1)
         self._table[:, anchors] = (robot.platform_anchors - robot.center_of_mass) @ self.axes
+        aboard = on_platform(robot)
+        if aboard.any():
+            self._table[aboard, tables.AXIS_X :] = self._table[aboard, tables.AXIS_X :] @ self.axes
         self.points = 0  # recorded points per cable with mass
         self._behind = has_routing(robot) or None
         self.state = self._state_at(pose, twist)  # row as in `sagline.kernels.dynamics.rigid_body`

@@ -165,7 +165,8 @@ class EnergyBalance(Result):
     Attributes:
         kinetic: Kinetic energy of platform, cables and drums.
         potential: Potential energy of the platform's weight, and of strain and height of the cables off the drums. The
-            height of the platform counts from the origin, the heights of the cables from their frame ends.
+            height of the platform counts from the origin, the heights of the cables from their frame ends, or from
+            their drums on the platform.
         supplied: Work done on the robot since the start by winches, external forces, wind and moving anchors. Anchors
             that rise also lift the weight of their cables; this work is not included, because heights of cables count
             from their frame ends.

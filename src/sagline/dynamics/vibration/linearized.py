@@ -14,7 +14,14 @@ from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, single_state
 from sagline.dynamics.vibration.flexibility import Flexibility
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
-from sagline.statics.slopes import CableSlopes, cable_slopes, frame_end_forces, motions_of_ends, on_platform
+from sagline.statics.slopes import (
+    CableSlopes,
+    cable_slopes,
+    frame_end_forces,
+    motions_of_ends,
+    on_platform,
+    wrenches_by_length,
+)
 from sagline.statics.stiffness import mass_matrix, modes
 
 if TYPE_CHECKING:
@@ -164,7 +171,7 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     A[place, speed] = np.eye(n)
     A[speed, place] = -freed @ slopes.matrix @ freedom.T
     A[speed, speed] = -freed @ drag @ freedom.T
-    A[speed, length] = -freed @ on_platform(slopes.by_length, slopes.levers)
+    A[speed, length] = -freed @ wrenches_by_length(state, slopes)
     B[speed, :m], B[speed, m:] = -freed @ by_speed, freed
     B[length, :m] = np.eye(m)
     C[:6, place] = freedom.T

@@ -11,11 +11,11 @@ from sagline.kernels.algebra.factors import solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
-from sagline.kernels.cable.swivel import DATA, SLOPES, slopes_of_swivel
+from sagline.kernels.cable.swivel import DATA, SLOPES, moments_of_swivel, slopes_of_swivel
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Unknowns, is_level
-from sagline.kernels.forward.platform import end_stiffness
+from sagline.kernels.calibration.terms import TURNS, CalibrationArrays, Sensing, Unknowns, is_level
+from sagline.kernels.forward.platform import end_stiffness, force_on_end, is_on_platform
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.statics import Triple, components_along, fill_motion_of_components, is_rotation
 
@@ -165,10 +165,31 @@ def _lever_of(rows: Array, i: int) -> Triple:
 
 
 @formula
-def _force_at(rows: Array, i: int) -> Triple:
-    """Force T on cable `i` at its platform end, world axes."""
-    x = rows[g.HORIZONTAL, i]
-    return x * rows[g.AZIMUTH_X, i], x * rows[g.AZIMUTH_Y, i], rows[g.VERTICAL, i]
+def _moment_of(cables: Array, space: CalibrationArrays, i: int, force: Triple) -> Triple:
+    """Moment about the center of mass of a change of the force on the platform end of cable `i`."""
+    moment = cross(_lever_of(space.rows, i), force)
+    if is_on_platform(cables, i):  # its pulley rotates with the platform
+        turns = space.turns[TURNS * i + DATA : TURNS * i + TURNS]
+        moment = plus(
+            moment,
+            (
+                turns[0, 0] * force[0] + turns[0, 1] * force[1] + turns[0, 2] * force[2],
+                turns[1, 0] * force[0] + turns[1, 1] * force[1] + turns[1, 2] * force[2],
+                turns[2, 0] * force[0] + turns[2, 1] * force[1] + turns[2, 2] * force[2],
+            ),
+        )
+    return moment
+
+
+@formula
+def _change_by_data(cables: Array, space: CalibrationArrays, i: int, k: int) -> tuple[Triple, Triple, float]:
+    """Changes by the data `k` of a cable with a swivel axis: force on its end, moment, and tension at a fixed force."""
+    slopes = space.slopes[SLOPES * i + k]
+    force, alone, own = (slopes[0], slopes[1], slopes[2]), slopes[3], (0.0, 0.0, 0.0)
+    if is_on_platform(cables, i):  # the tension is the force on the frame end
+        turns = space.turns[TURNS * i + k]
+        force, alone, own = opposite(force), 0.0, (-turns[0], -turns[1], -turns[2])
+    return force, plus(_moment_of(cables, space, i, force), own), alone
 
 
 @formula
@@ -213,21 +234,24 @@ def _add_wrench_change(space: CalibrationArrays, at: int, scale: float, force: T
 
 
 @formula
-def _add_force_change(space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float) -> None:
+def _add_force_change(
+    space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, moment: Triple, direct: float
+) -> None:
     """Add the effects of one cable force's change to a column: on the wrench, and on the reading of this cable."""
-    _add_wrench_change(space, at, scale, force, cross(_lever_of(space.rows, i), force))
+    _add_wrench_change(space, at, scale, force, moment)
     space.work[i, at] += scale * direct
 
 
 @kernel
 def _add_parameter_change(
-    sought: Unknowns, row: int, i: int, gain: float, change: Triple, alone: float, space: CalibrationArrays
-) -> None:
+    sought: Unknowns, row: int, i: int, gain: float, change: Triple, moment: Triple, alone: float,
+    space: CalibrationArrays,
+) -> None:  # fmt: skip
     """Add the effects of a parameter of cable `i` to a column: on its platform-end force and its frame-end tension."""
     at = sought.where[row, i]
     if at >= 0:
         direct = gain * (_tension_by_force(space.shares, i, change) + alone)
-        _add_force_change(space, i, at, sought.scale[row, i], change, direct)
+        _add_force_change(space, i, at, sought.scale[row, i], change, moment, direct)
 
 
 @glue
@@ -243,6 +267,13 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
             for k in range(3):
                 space.shares[i, k] = slopes[DATA + k, 3]
             space.shares[i, 3], space.shares[i, 4] = 0.0, space.rows[g.LEAVING, i]
+            if is_on_platform(cables, i):
+                moments_of_swivel(model, cables, space.rows, i, space.turns[TURNS * i : TURNS * i + TURNS])
+                force = force_on_end(cables, space.rows, i)
+                tension = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+                share = 1.0 / tension if tension > 0.0 else 0.0
+                space.shares[i, 0], space.shares[i, 1] = share * force[0], share * force[1]
+                space.shares[i, 2], space.shares[i, 4] = share * force[2], tension
             continue
         by = _frame_end_slopes(model, cables, space.rows, i)
         x, y, z = _in_world_axes(space.rows, i, PlaneVector(by.along, by.up))
@@ -251,14 +282,17 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 
 @glue
-def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
+def fill_readings_by_wrench(
+    sensing: Sensing, free: Array, cables: Array, reach: Triple, space: CalibrationArrays
+) -> None:
     """Fill the change of every reading per unit wrench on the platform. The stiffness must be factored."""
+    m = cables.shape[0]
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
             own = plus(_tension_by_motion(space.ends, j, space.shares), (0.0, 0.0, space.shares[j, 3]))
             force = (sensing.gain[j] * own[0], sensing.gain[j] * own[1], sensing.gain[j] * own[2])
-            moment = cross(_lever_of(space.rows, j), force)
+            moment = _moment_of(cables, space, j, force)
         elif j < m + 3:
             force = _column_of(space.axes, j - m)
             moment = cross(reach, force)
@@ -277,7 +311,7 @@ def _fill_material(
     model: Model, cables: Array, gain: float, sought: Unknowns, i: int, space: CalibrationArrays
 ) -> tuple[Triple, float]:
     """Add material and pulley of cable `i` to the columns. Changes of force and tension per length are returned."""
-    rows, by = space.rows, _frame_end_slopes(model, cables, space.rows, i)
+    rows, by, lever = space.rows, _frame_end_slopes(model, cables, space.rows, i), _lever_of(space.rows, i)
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
     if model.behind is None:
@@ -286,13 +320,13 @@ def _fill_material(
         free = rows[g.FREE_LENGTH, i]
         own = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
         change = _in_world_axes(rows, i, own.by_radius)
-        _add_parameter_change(sought, kinds.RADIUS, i, gain, change, by.by_radius, space)
+        _add_parameter_change(sought, kinds.RADIUS, i, gain, change, cross(lever, change), by.by_radius, space)
         change = _in_world_axes(rows, i, own.by_dead)
-        _add_parameter_change(sought, kinds.DEAD, i, gain, change, by.by_dead, space)
+        _add_parameter_change(sought, kinds.DEAD, i, gain, change, cross(lever, change), by.by_dead, space)
     change = _in_world_axes(rows, i, own.by_density)
-    _add_parameter_change(sought, kinds.DENSITY, i, gain, change, by.by_density, space)
+    _add_parameter_change(sought, kinds.DENSITY, i, gain, change, cross(lever, change), by.by_density, space)
     change = _in_world_axes(rows, i, own.by_stiffness)
-    _add_parameter_change(sought, kinds.STIFFNESS, i, gain, change, by.by_stiffness, space)
+    _add_parameter_change(sought, kinds.STIFFNESS, i, gain, change, cross(lever, change), by.by_stiffness, space)
     return _in_world_axes(rows, i, own.by_length), by.by_length
 
 
@@ -302,37 +336,38 @@ def fill_cable(
 ) -> None:
     """Add the unknowns of cable `i` to the columns, and fill the derivatives with respect to the cable's length."""
     where, scale, rows, ends, shares = sought.where, sought.scale, space.rows, space.ends, space.shares
-    lever, force = _lever_of(rows, i), _force_at(rows, i)
+    force = force_on_end(cables, rows, i)
     for axis in range(3):
         at = where[kinds.FRAME + axis, i]
         if at >= 0:
             change = opposite(_force_by_motion(ends, i, unit_vector(axis)))
             fall = shares[i, 3] if axis == 2 else 0.0
             direct = gain * (_tension_by_force(shares, i, change) - fall)
-            _add_force_change(space, i, at, scale[kinds.FRAME + axis, i], change, direct)
+            moment = _moment_of(cables, space, i, change)
+            _add_force_change(space, i, at, scale[kinds.FRAME + axis, i], change, moment, direct)
         at = where[kinds.PLATFORM + axis, i]
         if at >= 0:
             moved = _column_of(space.rotation, axis)
             change = _force_by_motion(ends, i, moved)
-            moment = plus(cross(moved, force), cross(lever, change))
+            moment = plus(cross(moved, force), _moment_of(cables, space, i, change))
             _add_wrench_change(space, at, scale[kinds.PLATFORM + axis, i], change, moment)
             direct = gain * (_tension_by_force(shares, i, change) + shares[i, 3] * moved[2])
             space.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
     if model.behind is not None and tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
-        slopes = space.slopes[SLOPES * i : SLOPES * i + SLOPES]
         for k in range(1, DATA):  # the rows of `kinds` have the same order
-            pulled = (slopes[k, 0], slopes[k, 1], slopes[k, 2])
-            _add_parameter_change(sought, kinds.DENSITY + k - 1, i, gain, pulled, slopes[k, 3], space)
-        change, alone = (slopes[0, 0], slopes[0, 1], slopes[0, 2]), slopes[0, 3]
+            pulled, turned, alone = _change_by_data(cables, space, i, k)
+            _add_parameter_change(sought, kinds.DENSITY + k - 1, i, gain, pulled, turned, alone, space)
+        change, by_length, alone = _change_by_data(cables, space, i, 0)
     else:
         change, alone = _fill_material(model, cables, gain, sought, i, space)
+        by_length = cross(_lever_of(rows, i), change)
     direct = gain * (_tension_by_force(shares, i, change) + alone)
-    _fill_length(space, i, change, cross(lever, change), direct)
+    _fill_length(space, i, change, by_length, direct)
     for k in range(5):
         row = kinds.ZERO + k if k < 2 else (kinds.STIFFNESS if k == 2 else kinds.SCALE + k - 3)
         at = where[row, i]
         if at >= 0:
-            _add_force_change(space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
+            _add_force_change(space, i, at, scale[row, i] * sought.paid[k, p, i], change, by_length, direct)
     if where[kinds.GAIN, i] >= 0:
         space.work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * shares[i, 4]
     if where[kinds.BIAS, i] >= 0:
@@ -361,7 +396,7 @@ def _fill_center(
     back = opposite(_free_displacement(free, _column_of(space.rotation, axis)))
     for i in range(m):
         change = _force_by_motion(space.ends, i, back)
-        moment = plus(cross(back, _force_at(space.rows, i)), cross(_lever_of(space.rows, i), change))
+        moment = plus(cross(back, force_on_end(cables, space.rows, i)), _moment_of(cables, space, i, change))
         _add_wrench_change(space, at, scale, change, moment)
         own = _tension_by_force(space.shares, i, change) + space.shares[i, 3] * back[2]
         space.work[i, at] += scale * sensing.gain[i] * own

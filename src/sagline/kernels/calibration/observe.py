@@ -16,7 +16,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import chord_tension_at_frame_end, hold_cable
-from sagline.kernels.cable.swivel import DATA, SLOPES, slopes_of_swivel, stiffness_of_swivel, swivel_at
+from sagline.kernels.cable.swivel import DATA, SLOPES, slopes_of_swivel, stiffness_of_swivel, swivel_in
 from sagline.kernels.cable.terms import Model, Pulley, Terms, chord_at, material_at, model_of
 from sagline.kernels.calibration import columns
 from sagline.kernels.calibration import terms as t
@@ -197,7 +197,7 @@ def observe(
         shift = (sensors.frame[0], sensors.frame[1], sensors.frame[2])
         from_system = columns.plus(columns.plus((pose[0], pose[1], pose[2]), target), columns.opposite(shift))
         columns.fill_ends(placed, cables, space)
-        columns.fill_readings_by_wrench(sensors, free, m, reach, space)
+        columns.fill_readings_by_wrench(sensors, free, cables, reach, space)
         answer.work[:] = 0.0
         for i in range(m):
             columns.fill_cable(placed, cables, sensors.gain[i], sought, p, i, space)
@@ -274,7 +274,7 @@ def _pulley_without_axis(cables: Array, i: int) -> Pulley:
 @formula
 def _length_to_drum(cables: Array, geometry: Array, i: int, tension: float) -> float:
     """Unstrained length [m] of a weightless cable between the tangent and the drum, with a swivel axis."""
-    swivel, chord = swivel_at(cables, i, 0.0), chord_at(geometry, i)
+    swivel, chord = swivel_in(geometry, cables, i, 0.0), chord_at(geometry, i)
     across = geometry[g.AZIMUTH_X, i] * swivel.x + geometry[g.AZIMUTH_Y, i] * swivel.y
     along = chord.cosine * across + chord.sine * swivel.z
     wrap = angle(math.sqrt(max(1.0 - along * along, 0.0)), along)
@@ -323,7 +323,8 @@ def starting_lengths(
             least[i] = LEAST * max(tau[i], 0.5 * material.density * model.gravity * chord.length)
             tau[i] = max(tau[i], least[i])
             six[:] = 0.0
-            platform.add_force(geometry, i, chord.cosine, chord.sine, six)
+            sign = -1.0 if platform.is_on_platform(cables, i) else 1.0
+            platform.add_force(geometry, i, sign * chord.cosine, sign * chord.sine, six)
             components_along(freedom, six, along[i])
         for j in range(n):
             for k in range(n):
@@ -338,7 +339,8 @@ def starting_lengths(
                 chord, material = chord_at(geometry, i), material_at(cables, i)
                 pulley = _pulley_without_axis(cables, i)
                 length_out[p, i], sag_force[i], _tension = hold_cable(model, chord, material, pulley, tau[i])
-                platform.add_force(geometry, i, 0.0, sag_force[i], six)
+                sign = -1.0 if platform.is_on_platform(cables, i) else 1.0
+                platform.add_force(geometry, i, 0.0, sign * sag_force[i], six)
             components_along(freedom, six, part)
             if not positive:
                 break

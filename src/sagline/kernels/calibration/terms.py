@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.cable.swivel import SLOPES
+from sagline.kernels.cable.swivel import DATA, SLOPES
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block, vector
 
+TURNS = DATA + 3  # rows of `moments_of_swivel`
 BESIDE = 6  # readings of a pose without load cells: position and rotation in the axes of the measuring system
 
 SensingArrays = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
@@ -88,6 +89,7 @@ class CalibrationArrays(NamedTuple):
     ends: Array  # stiffness of the platform ends, (m, 9)
     shares: Array  # derivatives of frame-end tensions by platform-end force and height, and the tensions, (m, 5)
     slopes: Array  # rows of `slopes_of_swivel` of all cables, (SLOPES m, 5); only with swivel axes of any direction
+    turns: Array  # rows of `moments_of_swivel` of pulleys on the platform, (TURNS m, 3)
     by_wrench: Array  # change of the wrench on the platform per length, (m, 6)
     by_length: Array  # change of the readings per length, A, (m, R)
     whole: Array  # covariance, then the inverse of its factor, (R, R)
@@ -113,12 +115,13 @@ def new_calibration_arrays(memory: Memory, m: int, n: int, work: Array) -> Calib
     ends, memory = block(memory, m, 9)
     shares, memory = block(memory, m, 5)
     slopes, memory = block(memory, SLOPES * m, 5)
+    turns, memory = block(memory, TURNS * m, 3)
     by_wrench, memory = block(memory, m, 6)
     by_length, memory = block(memory, m, readings)
     whole, memory = block(memory, readings, readings)
     own, memory = block(memory, readings, readings)
     deviation, memory = vector(memory, m + BESIDE)
     return CalibrationArrays(
-        rows, rotation, axes, stiffness, factor, matrix, part, six, moved, ends, shares, slopes, by_wrench, by_length,
-        whole, own, deviation, work[:-6], work[-6:],
+        rows, rotation, axes, stiffness, factor, matrix, part, six, moved, ends, shares, slopes, turns, by_wrench,
+        by_length, whole, own, deviation, work[:-6], work[-6:],
     )  # fmt: skip

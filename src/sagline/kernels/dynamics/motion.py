@@ -24,7 +24,7 @@ from sagline.kernels.dynamics.chain import wind_across
 from sagline.kernels.dynamics.drives import Drives, keep_set_points
 from sagline.kernels.dynamics.progress import Courses, Kept
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, VELOCITY, power_of, spin
-from sagline.kernels.forward.platform import add_force, platform_energy, unbalance
+from sagline.kernels.forward.platform import add_force, force_on_end, is_on_platform, platform_energy, unbalance
 from sagline.kernels.jit import entry, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import add_world_force, components_along, fill_motion_of_components
@@ -143,8 +143,13 @@ def _fill_frame_end_tensions(
             height = pulley.radius * pulley.entry * rows[g.WRAP_SINE, i]
             if tables.SWIVELS and cables.shape[1] > tables.CABLE_COLUMNS:
                 outward = (1.0 - rows[g.WRAP_COSINE, i]) * rows[g.CENTER_Z, i]
-                height = pulley.radius * (outward + rows[g.WRAP_SINE, i] * cables[i, tables.AXIS_Z])
+                height = pulley.radius * (outward + rows[g.WRAP_SINE, i] * rows[g.AXIS_Z, i])
+            if is_on_platform(cables, i):  # the height above the drum, which moves with the platform
+                height += rows[g.DRUM_RISE, i]
         whole = tension + 0.5 * tension * tension / stiffness - weight * height
+        if is_on_platform(cables, i):
+            x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
+            tension = math.sqrt(x * x + z * z)
         now[d.AT_FRAME, i] = now[d.PULL, i] = tension
         now[d.WHOLE, i] = whole
         now[d.AT_DRUM, i] = d.tension_at_drum(whole, weight * data[d.BEHIND_RISE, i], stiffness)
@@ -178,8 +183,10 @@ def _damp_cables(
         rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
         ux, uy, uz = vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx
         ax, ay, az = now[d.ANCHOR_X, i], now[d.ANCHOR_Y, i], now[d.ANCHOR_Z, i]
-        x, y = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i], rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
-        z, chord, length = rows[g.SINE, i], rows[g.CHORD, i], rows[g.LENGTH, i]
+        sign = -1.0 if is_on_platform(cables, i) else 1.0  # the chord points to the platform
+        along = sign * rows[g.COSINE, i]
+        x, y, z = rows[g.AZIMUTH_X, i] * along, rows[g.AZIMUTH_Y, i] * along, sign * rows[g.SINE, i]
+        chord, length = rows[g.CHORD, i], rows[g.LENGTH, i]
         stiffness, tension = cables[i, tables.STIFFNESS], rows[g.TENSION, i]
         weight = cables[i, tables.DENSITY] * weight_of * chord * rows[g.COSINE, i]
         share = 0.0
@@ -215,12 +222,12 @@ def _move_anchors(run: _MasslessRun, now: float) -> None:
 
 
 @kernel
-def _power_of_anchors(rows: Array, now: Array) -> float:
+def _power_of_anchors(cables: Array, rows: Array, now: Array) -> float:
     """Power of moving anchors on the cables [W], without that of lifting the cables with their anchors."""
     power = 0.0
     for i in range(rows.shape[1]):
-        level = rows[g.AZIMUTH_X, i] * now[d.ANCHOR_X, i] + rows[g.AZIMUTH_Y, i] * now[d.ANCHOR_Y, i]
-        power += now[d.ANCHOR_LOSS, i] - rows[g.HORIZONTAL, i] * level - rows[g.VERTICAL, i] * now[d.ANCHOR_Z, i]
+        x, y, z = force_on_end(cables, rows, i)
+        power += now[d.ANCHOR_LOSS, i] - (x * now[d.ANCHOR_X, i] + y * now[d.ANCHOR_Y, i] + z * now[d.ANCHOR_Z, i])
     return power
 
 
@@ -276,7 +283,7 @@ def _fill_damping(run: _MasslessRun) -> None:
             _project_on_freedom(run.freedom, run.damping, motion)
         drives.audit[d.GIVEN_POWER] = power_of(run.given, run.state, spinning)
         if tables.MOVES and (run.work & MOVED) > 0:
-            drives.audit[d.GIVEN_POWER] += _power_of_anchors(run.rows, drives.now)
+            drives.audit[d.GIVEN_POWER] += _power_of_anchors(run.cables, run.rows, drives.now)
 
 
 @glue
