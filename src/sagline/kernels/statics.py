@@ -297,7 +297,22 @@ def set_pose(
 
     `weight`: square roots of the weighting factors of the cables in the tension distribution, (m,).
     """
-    if not place_platform(model, limits, platform, platform.pose, cables, balance):
+    cable_geometry(platform.robot, platform.body, platform.pose, balance.rotation, balance.geometry)
+    return set_chords(model, limits, variable, weight, platform, cables, balance)
+
+
+@glue
+def set_chords(
+    model: Model,
+    limits: TensionLimits,
+    variable: int,
+    weight: Array,
+    platform: Platform,
+    cables: Cables,
+    balance: Balance,
+) -> int:
+    """`set_pose` with a known geometry."""
+    if not _place_chords(model, limits, platform, cables, balance):
         return codes.POSE_NO_CHORD
     _choose_variable(variable, weight, cables, balance)
     return codes.POSE_SOLVED if factor_balance(balance) else codes.POSE_SINGULAR
@@ -309,6 +324,12 @@ def place_platform(
 ) -> bool:
     """Fill cables, geometry and structure matrix at `pose`. False if a cable has no chord."""
     cable_geometry(platform.robot, platform.body, pose, balance.rotation, balance.geometry)
+    return _place_chords(model, limits, platform, cables, balance)
+
+
+@glue
+def _place_chords(model: Model, limits: TensionLimits, platform: Platform, cables: Cables, balance: Balance) -> bool:
+    """`place_platform` with a known geometry."""
     if not place_cables(model, limits, platform.robot, balance.geometry, cables):
         return False
     fill_structure_matrix(balance.geometry, balance.full)

@@ -132,7 +132,6 @@ def _exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
     # tangent is -k e_s.z/(v F.e_r - k e_r.z), with e_r and e_s of this plane. The wrap angle changes by the square of
     # this angle.
     nx, ny, nz = swivel.x, swivel.y, swivel.z
-    radius = swivel.radius
     along = x * nx + y * ny + z * nz
     rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
     square = rx * rx + ry * ry + rz * rz
@@ -141,28 +140,38 @@ def _exit_of(swivel: Swivel, x: float, y: float, z: float) -> Exit:
     inverse = 1.0 / (across + TINY)  # for a force along the axis, e_r is zero
     rx, ry, rz = rx * inverse, ry * inverse, rz * inverse
     sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
-    strained = 1.0 + tension / swivel.stiffness
     inverse = 1.0 / (tension + TINY)
     first, straight_sine, straight_cosine = angle(across + TINY, along), across * inverse, along * inverse
-    moment = swivel.weight * radius / strained * (first - straight_sine)
-    slope = (1.0 - straight_cosine) * across - moment * rz
+    # numerator and denominator times EA + T
+    moment = swivel.weight * swivel.radius * swivel.stiffness * (first - straight_sine)
+    slope = (1.0 - straight_cosine) * across * (swivel.stiffness + tension) - moment * rz
     turn = -moment * sz / slope if slope > 0.0 else 0.0
     turn = min(max(turn, -0.5), 0.5)
-    c = 1.0 / math.sqrt(1.0 + turn * turn)
+    square = 1.0 + turn * turn
+    root, size = math.sqrt(square), math.sqrt(across * across + along * along * square) + TINY
+    inverse = 1.0 / (root * size)
+    c, sine, cosine = size * inverse, across * root * inverse, along * square * inverse
     s = turn * c
-    outward = across * c
-    inverse = 1.0 / (math.sqrt(outward * outward + along * along) + TINY)
-    sine, cosine = outward * inverse, along * inverse
     less = straight_sine * cosine - straight_cosine * sine  # sine of the decrease of the wrap angle
     square = less * less
     wrap = first - less * (1.0 + square * (1.0 / 6.0 + square * 0.075))
     rx, ry, rz = c * rx + s * sx, c * ry + s * sy, c * rz + s * sz
     sx, sy, sz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
-    zeta, integral = _height(swivel, rz, sine, cosine, wrap)
-    _strained, entering, drawn = _strains(swivel, tension, zeta)
+    wrapped, dead = lengths_behind(swivel, rz, (sine, cosine), wrap, tension)
+    return Exit(rx, ry, rz, sx, sy, sz, sine, cosine, wrap, wrapped, dead)
+
+
+@formula
+def lengths_behind(
+    swivel: Swivel, rz: float, turn: tuple[float, float], wrap: float, tension: float
+) -> tuple[float, float]:
+    """Unstrained lengths on the pulley and between pulley and drum [m]. `turn`: sine and cosine of psi."""
+    zeta, integral = _height(swivel, rz, turn[0], turn[1], wrap)
+    strained, entering, drawn = _strains(swivel, tension, zeta)
     inverse = 1.0 / strained
-    wrapped = radius * (wrap + swivel.weight * radius / swivel.stiffness * integral * inverse * inverse) * inverse
-    return Exit(rx, ry, rz, sx, sy, sz, sine, cosine, wrap, wrapped, 2.0 * swivel.dead / (entering + drawn))
+    beta = swivel.weight * swivel.radius / swivel.stiffness
+    wrapped = swivel.radius * (wrap + beta * integral * inverse * inverse) * inverse
+    return wrapped, 2.0 * swivel.dead / (entering + drawn)
 
 
 @formula

@@ -15,12 +15,17 @@ from sagline.kernels import codes, statics, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.states import TensionLimits
-from sagline.kernels.cable.swivel import next_exit, swivel_at
+from sagline.kernels.cable.swivel import lengths_behind, next_exit, swivel_at
 from sagline.kernels.cable.terms import Cables, Model
 from sagline.kernels.jit import glue, independent
 
 SAME_EXIT = 2e-12  # change of an exit point after which the next change is a rounding error, relative to the free span
-LENGTH, SAG = 0, 1  # rows of the work array, before the motions are known
+NEXT_EXIT = 1e-14  # expected next change of an exit point that is left out
+# rows of the work array: motion of the exit point [m] and its size relative to the free span; for the last force, psi,
+# its sine and cosine, z of e_r, and e_s
+LENGTH, SAG = 0, 1  # before the motions are known
+MOTION, SIZE, WRAP, SINE, COSINE, UP, SIDE = 0, 3, 4, 5, 6, 7, 8
+ROWS = 11
 
 
 class Exits(NamedTuple):
@@ -28,7 +33,7 @@ class Exits(NamedTuple):
 
     swivels: Array  # rows of a cable_table with swivel axes, (m, SWIVEL_COLUMNS)
     limits: TensionLimits
-    work: Array  # motions of the exit points [m], and their sizes relative to the free spans, (4, m)
+    work: Array  # (ROWS, m)
 
 
 @glue
@@ -60,9 +65,11 @@ def move_exits(
         swivel, chord = swivel_at(exits.swivels, i, gravity), cables.chord[i]
         cx, cy, level = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i], cables.tau[i] * cables.cosine[i]
         up = cables.tau[i] * cables.sine[i] + new[SAG, i] - swivel.weight * new[LENGTH, i]
-        (x, y, z), _at = next_exit(swivel, exits.swivels, i, (level * cx, level * cy, up), anchors, chord)
+        (x, y, z), at = next_exit(swivel, exits.swivels, i, (level * cx, level * cy, up), anchors, chord)
         x, y, z = x - anchors[i, tables.FRAME_X], y - anchors[i, tables.FRAME_Y], z - anchors[i, tables.FRAME_Z]
-        new[0, i], new[1, i], new[2, i], new[3, i] = x, y, z, (abs(x) + abs(y) + abs(z)) / chord
+        new[0, i], new[1, i], new[2, i], new[SIZE, i] = x, y, z, (abs(x) + abs(y) + abs(z)) / chord
+        new[WRAP, i], new[SINE, i], new[COSINE, i], new[UP, i] = at.wrap, at.sine, at.cosine, at.rz
+        new[SIDE, i], new[SIDE + 1, i], new[SIDE + 2, i] = at.sx, at.sy, at.sz
         x, y, z = rows[g.SPAN, i] * cx - x, rows[g.SPAN, i] * cy - y, rows[g.RISE, i] - z
         span = math.sqrt(x * x + y * y)
         chord = math.sqrt(span * span + z * z)
@@ -73,9 +80,9 @@ def move_exits(
         rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i] = chord, z * inverse, span * inverse
     change = 0.0
     for i in range(m):
-        change = max(change, new[3, i])
+        change = max(change, new[SIZE, i])
         for k in range(3):
-            anchors[i, tables.FRAME_X + k] += new[k, i]
+            anchors[i, tables.FRAME_X + k] += new[MOTION + k, i]
     for i in range(m):
         cables.chord[i], cables.sine[i], cables.cosine[i] = rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i]
         cables.half_weight[i] = 0.5 * cables.density[i] * model.gravity * cables.chord[i]
@@ -106,18 +113,15 @@ def fill_needed_wrench(
 
 
 @glue
-def write_behind(
-    model: Model, exits: Exits, platform: statics.Platform, cables: Cables, balance: statics.Balance, results: Array,
-    p: int,
-) -> None:  # fmt: skip
+def write_behind(model: Model, exits: Exits, cables: Cables, balance: statics.Balance, results: Array, p: int) -> None:
     """Write the rows for pulleys and dead lengths of a solved pose. Its lengths do not include them yet."""
-    rows, gravity = balance.geometry, model.gravity if model.code == codes.CATENARY else 0.0
+    rows, known, gravity = balance.geometry, exits.work, model.gravity if model.code == codes.CATENARY else 0.0
     for i in independent(cables.tau.size):
-        swivel, level = swivel_at(exits.swivels, i, gravity), cables.tau[i] * cables.cosine[i]
-        up = cables.tau[i] * cables.sine[i] + cables.sag_force[i] - swivel.weight * (cables.ratio[i] * cables.chord[i])
-        force = level * rows[g.AZIMUTH_X, i], level * rows[g.AZIMUTH_Y, i], up
-        _point, at = next_exit(swivel, exits.swivels, i, force, platform.robot, cables.chord[i])
-        results[tables.WRAP, p, i], results[tables.WRAPPED, p, i] = at.wrap, at.wrapped
-        results[tables.DEAD, p, i], results[tables.SINE, p, i] = at.dead, cables.sine[i]
+        swivel, x = swivel_at(exits.swivels, i, gravity), cables.tau[i] * cables.cosine[i]
+        z = cables.tau[i] * cables.sine[i] + cables.sag_force[i] - swivel.weight * (cables.ratio[i] * cables.chord[i])
+        turn, tension = (known[SINE, i], known[COSINE, i]), math.sqrt(x * x + z * z)
+        wrapped, dead = lengths_behind(swivel, known[UP, i], turn, known[WRAP, i], tension)
+        results[tables.WRAP, p, i], results[tables.WRAPPED, p, i] = known[WRAP, i], wrapped
+        results[tables.DEAD, p, i], results[tables.SINE, p, i] = dead, cables.sine[i]
     for i in range(cables.tau.size):
         results[tables.AZIMUTH, p, i] = math.atan2(rows[g.AZIMUTH_Y, i], rows[g.AZIMUTH_X, i])

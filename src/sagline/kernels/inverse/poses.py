@@ -18,7 +18,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import states
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Cables, Model, chord_of, material_of, new_cables, pulley_of
-from sagline.kernels.inverse.exits import SAME_EXIT, Exits, fill_needed_wrench, move_exits
+from sagline.kernels.inverse.exits import NEXT_EXIT, SAME_EXIT, Exits, fill_needed_wrench, move_exits
 from sagline.kernels.inverse.stability import new_stability_arrays, proves_stability
 from sagline.kernels.jit import entry, glue, kernel
 from sagline.kernels.memory import Memory
@@ -74,7 +74,7 @@ def distribute_and_solve_cables(
     if work is not None:
         reset_work_arrays(work)
     nearest.set_reference(distribution, balance.offset, balance.null, near)
-    solved, away = False, 0.0
+    solved, away, placed = False, 0.0, False
     statics.fill_needed_wrench(platform, cables, balance)
     possible = states.cable_without_tension(cables) < 0
     status = codes.POSE_NOT_CONVERGED if possible else codes.POSE_INFEASIBLE
@@ -94,7 +94,11 @@ def distribute_and_solve_cables(
             break
         moved, largest = take_tensions(cables, balance)
         if exits is not None:
-            away = move_exits(model, exits, platform, cables, balance, not solved)
+            if placed:
+                away = 0.0
+            else:
+                before, away = away, move_exits(model, exits, platform, cables, balance, not solved)
+                placed = away * away <= NEXT_EXIT * before  # successive changes have a nearly constant ratio
         gravest, turned = states.solve_cable_states(
             model, cables, not solved, solved and moved + away < states.NEAR, statuses
         )

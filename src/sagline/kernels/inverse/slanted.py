@@ -9,10 +9,11 @@ import math
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes, statics, tables
+from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.states import TensionLimits
 from sagline.kernels.cable.terms import new_cables
 from sagline.kernels.inverse import poses as inverse
-from sagline.kernels.inverse.exits import Exits, start_at_tangents, write_behind
+from sagline.kernels.inverse.exits import ROWS, Exits, start_at_tangents, write_behind
 from sagline.kernels.inverse.stability import new_stability_arrays, proves_stability
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block
@@ -50,7 +51,7 @@ def inverse_poses_of_slanted(
     cables, rest = new_cables(Memory(*memory), m, False)
     balance, rest = statics.new_balance(rest, m, n)
     near, rest = nearest.new_reference_point(rest, previous, m - n)
-    work, rest = block(rest, 4, m)
+    work, rest = block(rest, ROWS, m)
     proof, rest = new_stability_arrays(rest, m, n - statics.translation_count(freedom))
     others = new_work_arrays(distribution.method, rest, m, m - n)
     for p in range(first, last):
@@ -60,7 +61,10 @@ def inverse_poses_of_slanted(
         statuses[p] = codes.CABLE_SOLVED
         if math.isnan(platform.robot[0, tables.FRAME_X]):
             start_at_tangents(exits, platform, balance)
-        status = statics.set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
+        else:
+            cable_geometry(platform.robot, platform.body, platform.pose, balance.rotation, balance.geometry)
+        variable, weight = distribution.variable, distribution.weight
+        status = statics.set_chords(model, limits, variable, weight, platform, cables, balance)
         if status == codes.POSE_SOLVED:
             status = inverse.distribute_and_solve_cables(
                 model, inverse.Method(distribution, near), platform, cables, balance, others, exits, statuses[p]
@@ -81,4 +85,4 @@ def inverse_poses_of_slanted(
         inverse.write_solution(status == codes.POSE_SOLVED, model, cables, balance, results, p)
         results[tables.WRAP :, p] = math.nan
         if status == codes.POSE_SOLVED:
-            write_behind(model, exits, platform, cables, balance, results, p)
+            write_behind(model, exits, cables, balance, results, p)

@@ -19,9 +19,9 @@ from sagline.kernels.algebra.functions import EXCESS_LIMIT, atanhc_excess_polyno
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.models import sag_of_shallow
 from sagline.kernels.cable.pulley import Wrap, softness
-from sagline.kernels.cable.swivel import next_exit, swivel_at
+from sagline.kernels.cable.swivel import swivel_at
 from sagline.kernels.cable.terms import Cables, Model, pulley_of
-from sagline.kernels.inverse.exits import Exits
+from sagline.kernels.inverse.exits import COSINE, SIDE, SINE, WRAP, Exits
 from sagline.kernels.jit import formula, glue, independent
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.statics import Balance, Platform
@@ -72,7 +72,7 @@ def proves_stability(
     if exits is None:
         _fill_compliances(model, cables, work)
     else:
-        _fill_compliances_of_slanted(model, exits, platform, cables, balance, work.compliance)
+        _fill_compliances_of_slanted(model, exits, cables, balance, work.compliance)
     first = balance.inverse.shape[0] - k
     trace = 0.0
     for i in range(cables.tau.size):
@@ -201,12 +201,12 @@ def _fill_shallow_compliances(model: Model, cables: Cables, work: StabilityArray
 
 @glue
 def _fill_compliances_of_slanted(
-    model: Model, exits: Exits, platform: Platform, cables: Cables, balance: Balance, compliance: Array
+    model: Model, exits: Exits, cables: Cables, balance: Balance, compliance: Array
 ) -> None:
     """`_fill_compliances` along the first chords, for swivel axes of any direction."""
     # Behind the exit point, the cable is as soft as without weight, and the pulley swings about its axis. The weight
     # changes this by a share of about (wR/T)^2 + w(R psi + D)/EA; the bounds are larger by a tenth.
-    rows, gravity = balance.geometry, model.gravity if model.code == codes.CATENARY else 0.0
+    rows, known, gravity = balance.geometry, exits.work, model.gravity if model.code == codes.CATENARY else 0.0
     for i in independent(cables.tau.size):
         swivel, length = swivel_at(exits.swivels, i, gravity), cables.ratio[i] * cables.chord[i]
         cx, cy = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
@@ -216,10 +216,9 @@ def _fill_compliances_of_slanted(
         turn, bent, excess = _bending(swivel.weight * length, x, z, level, uz)
         bent += 2.0 * (1.0 + excess) * (across * across)
         za = z - swivel.weight * length
-        _point, at = next_exit(swivel, exits.swivels, i, (x * cx, x * cy, za), platform.robot, cables.chord[i])
-        aside = ux * at.sx + uy * at.sy + uz * at.sz
-        swing = swivel.radius * at.sine / ((1.0 + at.cosine) * math.sqrt(x * x + za * za))
-        behind = (swivel.radius * at.wrap + swivel.dead) / cables.stiffness[i] + swing * aside * aside
+        aside = ux * known[SIDE, i] + uy * known[SIDE + 1, i] + uz * known[SIDE + 2, i]
+        swing = swivel.radius * known[SINE, i] / ((1.0 + known[COSINE, i]) * math.sqrt(x * x + za * za))
+        behind = (swivel.radius * known[WRAP, i] + swivel.dead) / cables.stiffness[i] + swing * aside * aside
         light = swivel.weight * swivel.radius <= WEIGHT_ON_PULLEY * math.sqrt(x * x + za * za)
         share = MORE if light else math.inf
         compliance[i] = length * (1.0 / cables.stiffness[i] + turn * bent) + share * behind
