@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 SLACKEST: Final = {codes.LIMITS_OF_CHORD: (1.0, 1.0, 0.0), codes.LIMITS_OF_FRAME_END: (0.5, 3.3, 0.61)}
 PULLEY: Final = 10.4  # bound of the change of the first moment of the cable on a pulley of radius 1
 STRETCH: Final = 0.02  # largest wD/(2 EA) with a bound
-STEEPEST: Final = (
-    1.14  # largest slope of a sag force with respect to the exit point up to wD/(2 tau) = 1, in units of w
-)
+STEEPEST: Final = 1.14  # largest slope of a sag force by the exit point, up to wD/(2 tau) = 1, in units of w
 BEND: Final = 1.1  # bound of asin(y)/y up to y = 0.7
 TURN: Final = 0.02  # [rad], added to the largest turn of the force
 HARDLY: Final = 1e-9  # [N], smallest distance of the margin of an infeasible pose from zero
