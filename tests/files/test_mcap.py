@@ -24,6 +24,7 @@ from sagline.files.mcap_layout import DECIMALS, EVERY, columns_of
 from sagline.files.mcap_reader import LogReader, read_log
 from sagline.files.mcap_writer import PACKAGES
 from sagline.files.plan_file import plan_dataset
+from tests.control.stops import HOME, TEN_POSES
 from tests.effort import AGAIN
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.refusal import refused
@@ -312,9 +313,7 @@ def test_a_missing_package_is_reported_in_one_sentence(
 
 @pytest.mark.soak
 def test_fourteen_minutes_with_the_plan_take_twenty_megabytes(tmp_path: Path) -> None:
-    from sagline.article.ten_poses import HOME, Table2
-
-    stops = np.repeat([HOME, *Table2().desired, HOME], [1, *10 * [2], 1], axis=0)
+    stops = np.repeat([HOME, *TEN_POSES, HOME], [1, *10 * [2], 1], axis=0)
     durations = [73.0, *10 * [3.0, 73.0]]
     plan = sl.inverse(ROBOT, sl.quintic_path(stops, durations=durations))
     assert len(plan.status) == 83_301

@@ -22,7 +22,7 @@ from sagline.robot.equilibrium import cables_of_results, limited_tension
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import has_chords
-from sagline.workspaces.margin import Bracket
+from sagline.workspaces.moving_exits import Bracket
 from sagline.workspaces.region import Orientations
 from sagline.workspaces.wrench_sets import WrenchSet
 

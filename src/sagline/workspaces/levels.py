@@ -24,7 +24,8 @@ from sagline.workspaces.balanced import BalancedMargins
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, Given
 from sagline.workspaces.grid import Grid
-from sagline.workspaces.margin import Bracket, MarginRows
+from sagline.workspaces.margin import MarginRows
+from sagline.workspaces.moving_exits import Bracket
 from sagline.workspaces.region import AXES, Orientations
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 

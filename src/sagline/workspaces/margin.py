@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +27,7 @@ from sagline.robot.reach import check_cable_count, check_reach
 from sagline.robot.robot import Robot
 from sagline.statics.tables import check_slanted, eyelets_at, geometry_of, pose_rows, robot_terms, tangent_exits
 from sagline.tension.method import LIMITS_OF
-from sagline.workspaces.moving_exits import with_moving_exits
+from sagline.workspaces.moving_exits import Bracket, with_moving_exits
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet, load_of
 
 if TYPE_CHECKING:
@@ -38,17 +38,6 @@ if TYPE_CHECKING:
 
 BLOCK = 1 << 13  # poses per block; a block takes about 0.1 s, and interrupts are handled between blocks
 _CATENARY, _ALL = Catenary(), slice(None)
-
-
-class Bracket(NamedTuple):
-    """Margins of N poses with their bounds. `Margin` has the same fields, and also the robot and the poses."""
-
-    value: Array  # continuous margin between `low` and `high` [N], (N,)
-    low: Array  # lower bound of the margin for all sag forces [N], (N,)
-    high: Array  # upper bound [N], (N,)
-    cable: Indices  # cable whose limit has the largest effect on the value, -1 for none, (N,)
-    status: Codes  # codes of `MarginStatus`, (N,)
-    direction: Array  # normal of the nearest facet, (N, 6)
 
 
 class MarginRows:

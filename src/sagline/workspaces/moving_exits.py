@@ -7,12 +7,12 @@ decide the sign of the margin, `inverse` decides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, Codes, Indices, locked
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.workspaces.wrench_set import SetTerms
@@ -23,9 +23,6 @@ from sagline.robot.batch import Robots, on_platform, robots_at
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 
-if TYPE_CHECKING:
-    from sagline.workspaces.margin import Bracket
-
 # for limits of chord tensions and of frame-end tensions: largest wD/(2 tau) with a bound; factor of the bound, which
 # includes the motion of the limit; largest difference between both tensions, relative to wD/2
 SLACKEST: Final = {codes.LIMITS_OF_CHORD: (1.0, 1.0, 0.0), codes.LIMITS_OF_FRAME_END: (0.5, 3.3, 0.61)}
@@ -35,6 +32,17 @@ STEEPEST: Final = 1.14  # largest slope of a sag force by the exit point, up to 
 BEND: Final = 1.1  # bound of asin(y)/y up to y = 0.7
 TURN: Final = 0.02  # [rad], added to the largest turn of the force
 HARDLY: Final = 1e-9  # [N], smallest distance of the margin of an infeasible pose from zero
+
+
+class Bracket(NamedTuple):
+    """Margins of N poses with their bounds. `Margin` has the same fields, and also the robot and the poses."""
+
+    value: Array  # continuous margin between `low` and `high` [N], (N,)
+    low: Array  # lower bound of the margin for all sag forces [N], (N,)
+    high: Array  # upper bound [N], (N,)
+    cable: Indices  # cable whose limit has the largest effect on the value, -1 for none, (N,)
+    status: Codes  # codes of `MarginStatus`, (N,)
+    direction: Array  # normal of the nearest facet, (N, 6)
 
 
 class Errors(NamedTuple):
@@ -82,7 +90,7 @@ def errors_of_exits(table: Array, gravity: float, geometry: Array, limited: int)
     return Errors(*bounds)
 
 
-Measure = Callable[..., "Bracket"]
+Measure = Callable[..., Bracket]
 Terms = tuple[int, Array, Array, Array, Array]
 
 

@@ -101,7 +101,7 @@ def _axes(words: str, across: Place, up: Place, decades: tuple[float, float], fi
 
 UP_TO = 20.0  # initial highest frequency [Hz]
 HIGHEST = 200.0  # largest value of the highest frequency [Hz]
-ROWS: Final = 40  # longest list; each row has a button, and the keyboard reaches what follows only after all buttons
+ROWS: Final = 200  # longest list; each row has a button, and the keyboard reaches what follows only after all buttons
 FIELD = "Mode"
 TOPIC: Final = "mode"  # topic of the messages with the name of a clicked mode
 
