@@ -92,31 +92,7 @@ class StopObserver:
 
 
 class Experiment:
-    """Result of the experiment; the time series have K points, and the robot has m winches.
-
-    Attributes:
-        table: Values of the article.
-        robot: Robot used by the controller.
-        true: True positions of the platform at the ten stops [m], shape (10, 3).
-        estimated: Positions estimated from the encoders at the stops [m], shape (10, 3).
-        tension: Measured tensions at the stops, as means over a second [N], shape (10, m).
-        planned_tension: Planned tensions at the stops [N], shape (10, m).
-        null_error: Largest tension error of a cable in the null space, which length changes can correct without motion
-            [N], shape (10,).
-        correction: Correction of the lengths by the tension loop at the stops [m], shape (10, m).
-        back: Final minus initial position of the platform at home [m], shape (3,).
-        time: Time of motion, without the stops [s], shape (K,).
-        cells: Measured tensions [N], shape (K, m).
-        planned: Planned tensions [N], shape (K, m).
-        lengths: Lengths minus lengths at home [m], shape (K, m).
-        stops: Times of the ten stops on the time axis `time`, shape (10,).
-        duration: Duration from home to home, including stops [s].
-        winch_speed: Largest speed of a winch [m/s].
-        farthest: Largest distance between true position and set point in motion [m].
-        misjudged: Largest distance between true and estimated position [m].
-        acting: Share of the cycles at stops in which the tension loop changes the lengths.
-        events: Events of the controller.
-    """
+    """Result of the experiment; the time series have K points, and the robot has m winches."""
 
     def __init__(
         self,
@@ -127,22 +103,41 @@ class Experiment:
         ends: Array,
     ) -> None:
         """Evaluate observations at the stops, plans of the legs, and times (12,) of the ends of the legs."""
+        # table: values of the article
+        # robot: robot used by the controller
         self.table, self.robot, m = Table2(), controller.robot, controller.robot.cable_count
         true, estimated, tension, correction = (np.array(column) for column in zip(*stops[1:], strict=True))
         planned = np.array([plan.state.cables.frame_end_tension[-1] for plan in plans])
         seen = [
             control.null_space(plan.state[-1]).visible @ off for plan, off in zip(plans, tension - planned, strict=True)
         ]
+        # true: true positions of the platform at the ten stops [m], shape (10, 3)
+        # estimated: positions estimated from the encoders at the stops [m], shape (10, 3)
+        # tension: measured tensions at the stops, as means over a second [N], shape (10, m)
         self.true, self.estimated, self.tension = true[:-1], estimated[:-1], tension[:-1]
+        # planned_tension: planned tensions at the stops [N], shape (10, m)
+        # correction: correction of the lengths by the tension loop at the stops [m], shape (10, m)
         self.planned_tension, self.correction = planned[:-1], correction[:-1]
+        # null_error: largest tension error of a cable in the null space, which length changes can correct without
+        # motion [N], shape (10,)
+        # back: final minus initial position of the platform at home [m], shape (3,)
         self.null_error, self.back = np.abs(seen[:-1]).max(axis=1), true[-1] - stops[0][0]
+        # cells: measured tensions [N], shape (K, m)
+        # planned: planned tensions [N], shape (K, m)
         time, self.cells, self.planned, lengths = np.split(np.array(watch.courses), [1, 1 + m, 1 + 2 * m], axis=1)
+        # time: time of motion, without the stops [s], shape (K,)
+        # lengths: lengths minus lengths at home [m], shape (K, m)
+        # stops: times of the ten stops on the time axis `time`, shape (10,)
         self.time, self.lengths, self.stops = time[:, 0], lengths - plans[0].unstrained_length[0], ends[1:-1]
-        self.duration = PERIOD * watch.cycles
+        self.duration = PERIOD * watch.cycles  # duration from home to home, including stops [s]
         rates = [plan.length_rate for plan in plans]
+        # largest speed of a winch [m/s]
         self.winch_speed = max(float(np.abs(rate).max()) for rate in rates if rate is not None)
+        # farthest: largest distance between true position and set point in motion [m]
+        # misjudged: largest distance between true and estimated position [m]
+        # acting: share of the cycles at stops in which the tension loop changes the lengths
         self.farthest, self.misjudged, self.acting = watch.farthest, watch.misjudged, watch.acted / watch.stood
-        self.events = controller.events
+        self.events = controller.events  # events of the controller
 
     @property
     def error(self) -> Array:

@@ -112,30 +112,27 @@ ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # gives actual minus d
 
 
 class Explanation:
-    """Best fit of the errors of k parameters, within plausible limits, to the measured positions.
-
-    Attributes:
-        parameters: The k parameters.
-        values: Errors of the parameters in their units, shape (k,).
-        deviation: Standard deviations of the errors in their units, shape (k,); NaN at a limit.
-        at_limit: True for errors that are at their plausible limit, shape (k,).
-        predicted: Actual minus desired position with these errors [m], shape (N, 3).
-        rms: Root mean square of measured minus predicted position, over all coordinates [m].
-        worst: Largest distance of measured and predicted position [m].
-        aicc: Akaike's information criterion, corrected for few measurements. Smaller values are better. A difference of
-            2 is not significant.
-        left_out: As `rms`, but the prediction of each pose comes from a fit to all other poses [m].
-    """
+    """Best fit of the errors of k parameters, within plausible limits, to the measured positions."""
 
     def __init__(self, model: Model, values: Array, slopes: Array, predicted: Array, measured: Array) -> None:
         """Evaluate the fitted `values`; `slopes`: derivatives of the positions."""
         rest = measured - predicted
+        # parameters: the k parameters
+        # values: errors of the parameters in their units, shape (k,)
+        # predicted: actual minus desired position with these errors [m], shape (N, 3)
         self.parameters, self.values, self.predicted = model, values, predicted
+        # rms: root mean square of measured minus predicted position, over all coordinates [m]
+        # worst: largest distance of measured and predicted position [m]
         self.rms, self.worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
         low, high = _limits(model)
+        # true for errors that are at their plausible limit, shape (k,)
         self.at_limit: Flags = (values >= (1.0 - NEAR) * high) | (values <= low + NEAR * high)
+        # standard deviations of the errors in their units, shape (k,); NaN at a limit
         self.deviation = _deviation(slopes, ~self.at_limit, rest)
+        # akaike's information criterion, corrected for few measurements. Smaller values are better. A difference of 2
+        # is not significant
         self.aicc = corrected_aic(self.rms, rest.size, len(model))
+        # as `rms`, but the prediction of each pose comes from a fit to all other poses [m]
         self.left_out = _left_out(model, values, slopes, rest)
 
     @property

@@ -22,19 +22,7 @@ LOW_PART = 50.0  # lowest tension of the curve [N], as in the article
 
 
 class FeasibleSets:
-    """Sets psi for some lengths, curve Psi for all lengths, and the line pi that is fitted to the projection of Psi.
-
-    Attributes:
-        cable: Material.
-        end: Desired position B_d of the platform end.
-        tolerance: epsilon_max of (20) [m].
-        psi_lengths: Lengths L of the sets psi [m], shape (s,).
-        psi: Outlines of the sets psi in the (T_x, T_z) plane [N], shape (s, points, 2).
-        tensions: T_x along the curve Psi [N], shape (t,).
-        vertical: T_z along the curve Psi [N], shape (t,).
-        lengths: L along the curve Psi [m], shape (t,).
-        line: Slope a_pi and intercept b_pi [N] of the line pi through the points (T_x, T_z).
-    """
+    """Sets psi for some lengths, curve Psi for all lengths, and the line pi that is fitted to the projection of Psi."""
 
     def __init__(
         self, cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
@@ -45,15 +33,23 @@ class FeasibleSets:
         # necessary. Source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
         if points % 4:
             raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
+        # cable: material
+        # end: desired position B_d of the platform end
+        # tolerance: epsilon_max of (20) [m]
         self.cable, self.end, self.tolerance = cable, end, tolerance
         model, stretch = sl.Catenary(), float(np.hypot(*end)) / end[0]
         curve = model.from_tension(cable, *end, tensions * stretch, GRAVITY)
+        # lengths L of the sets psi [m], shape (s,)
         self.psi_lengths = model.from_tension(cable, *end, psi_tensions * stretch, GRAVITY).unstrained_length
         outline = np.asarray(end) + tolerance * _diamond(points)
         around = model.from_length(cable, outline[:, 0], outline[:, 1], self.psi_lengths[:, None], GRAVITY)
+        # outlines of the sets psi in the (T_x, T_z) plane [N], shape (s, points, 2)
         self.psi = np.stack((around.horizontal_tension, around.vertical_force), axis=-1)
+        # tensions: T_x along the curve Psi [N], shape (t,)
+        # vertical: T_z along the curve Psi [N], shape (t,)
         self.tensions, self.vertical = curve.horizontal_tension, curve.vertical_force
-        self.lengths = curve.unstrained_length
+        self.lengths = curve.unstrained_length  # L along the curve Psi [m], shape (t,)
+        # slope a_pi and intercept b_pi [N] of the line pi through the points (T_x, T_z)
         self.line = fit_line(self.tensions, self.vertical)
 
     @property

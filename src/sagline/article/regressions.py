@@ -84,23 +84,20 @@ LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals of lowes
 
 
 class InterceptStudy:
-    """Intercepts b_pi for one end of the cable, and the regressions of the article that lead from b_pi to k_h.
-
-    Attributes:
-        sampling: The cables, a angles, c chords, r densities.
-        intercept: Intercepts b_pi of the fitted lines [N], shape (a, c, r).
-        h_b: Factor in b_pi = h_b D [N/m], shape (a, r).
-        k_h_of_angle: Factor in h_b = k_h rho, fitted for each angle [m/s^2], shape (a,).
-        k_h: Factor in h_b = k_h rho, fitted for all angles together [m/s^2].
-    """
+    """Intercepts b_pi for one end of the cable, and the regressions of the article that lead from b_pi to k_h."""
 
     def __init__(self, sampling: Sampling, vertical: Array) -> None:
         """Regressions of the vertical forces `vertical` [N] at one end of the cables."""
         _, intercept = fit_line(sampling.tensions, vertical)
+        # sampling: the cables, a angles, c chords, r densities
+        # intercept: intercepts b_pi of the fitted lines [N], shape (a, c, r)
         self.sampling, self.intercept = sampling, intercept
+        # factor in b_pi = h_b D [N/m], shape (a, r)
         self.h_b = fit_factor(sampling.chords[:, None], intercept, axis=-2)
+        # factor in h_b = k_h rho, fitted for each angle [m/s^2], shape (a,)
         self.k_h_of_angle = fit_factor(sampling.densities, self.h_b)
         everywhere = np.broadcast_to(sampling.densities, self.h_b.shape)
+        # factor in h_b = k_h rho, fitted for all angles together [m/s^2]
         self.k_h = float(fit_factor(everywhere.ravel(), self.h_b.ravel()))
 
     @property
@@ -121,25 +118,21 @@ def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStud
 
 
 class SagStudy:
-    """Regressions (41), (43), (44) and (45) of the article, from the adjusting length d to the constant k_p.
-
-    Attributes:
-        sampling: The cables, a angles, c chords, r densities, t tensions.
-        adjusting_length: Adjusting lengths d [m], shape (a, c, r, t).
-        a_d: Factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r).
-        q_a: Factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r).
-        p_q: Factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,).
-        k_p: Factor in p_q = k_p rho^2 (45) [m^2/s^4].
-    """
+    """Regressions (41), (43), (44) and (45) of the article, from the adjusting length d to the constant k_p."""
 
     def __init__(self, sampling: Sampling) -> None:
         """Fit the factors to sampled cables."""
         # source: Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15
+        # sampling: the cables, a angles, c chords, r densities, t tensions
+        # adjusting_length: adjusting lengths d [m], shape (a, c, r, t)
         self.sampling, self.adjusting_length = sampling, sampling.hang().adjusting_length
+        # factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r)
         self.a_d = fit_factor(sampling.tensions**-2, self.adjusting_length)
+        # factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r)
         self.q_a = fit_factor(sampling.chords[:, None] ** 3, self.a_d, axis=-2)
+        # factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,)
         self.p_q = fit_factor(np.cos(sampling.angles)[:, None] ** 4, self.q_a, axis=-2)
-        self.k_p = float(fit_factor(sampling.densities**2, self.p_q))
+        self.k_p = float(fit_factor(sampling.densities**2, self.p_q))  # factor in p_q = k_p rho^2 (45) [m^2/s^4]
 
     @property
     def fitted_length(self) -> Array:

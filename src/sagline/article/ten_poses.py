@@ -16,24 +16,18 @@ from sagline.motion.rest_to_rest import QUINTIC
 
 
 class Table2:
-    """Table 2 of the article with the printed values.
-
-    Attributes:
-        points: Names of the ten poses.
-        desired: Desired positions [m], shape (10, 3).
-        actual: Measured positions [m], shape (10, 3).
-        printed_error: Positioning errors as printed [m], shape (10,).
-    """
+    """Table 2 of the article with the printed values."""
 
     def __init__(self) -> None:
         """Read the table from the package."""
         # source: Gia Luan & Truong Thinh 2020, Table 2
         text = files("sagline.article").joinpath("data/table2.csv").read_text(encoding="utf-8")
         rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))[1:]
+        # points: names of the ten poses
         self.points, numbers = tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
-        self.desired: Array = locked(numbers[:, 0:3].copy())
-        self.actual: Array = locked(numbers[:, 3:6].copy())
-        self.printed_error: Array = locked(1e-3 * numbers[:, 6])
+        self.desired: Array = locked(numbers[:, 0:3].copy())  # desired positions [m], shape (10, 3)
+        self.actual: Array = locked(numbers[:, 3:6].copy())  # measured positions [m], shape (10, 3)
+        self.printed_error: Array = locked(1e-3 * numbers[:, 6])  # positioning errors as printed [m], shape (10,)
 
     @property
     def error(self) -> Array:
@@ -53,22 +47,7 @@ TOUR_SPEED = 0.2  # assumed speed [m/s]; the article states "low speed"
 
 
 class TenPoses:
-    """The ten poses, their errors, and possible explanations of these errors.
-
-    Attributes:
-        table: Values of the article.
-        plan: Plan of the prototype for the ten poses, with the empirical model.
-        home: Plan of the prototype for its home pose.
-        model_error: Error of the empirical model at the ten poses [m], shape (10, 3).
-        trends: Name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3).
-        explanations: All explanations by one parameter, by two and by three parameters; each list is sorted by the
-            remaining error.
-        imitated: Share of a pulley radius's effect that errors of length offset and anchor height together can
-            reproduce (ratio of vector norms).
-        single_zero: Standard deviations of the length offsets of all cables [m], shape (m,).
-        dead_meter: Actual minus desired positions that 1 m of dead length would cause [m], shape (10, 3).
-        measured_rms: Root mean square of the measured errors, over all coordinates [m].
-    """
+    """The ten poses, their errors, and possible explanations of these errors."""
 
     def __init__(self) -> None:
         """Plan the prototype at the ten poses, and search for possible causes of the measured errors."""
@@ -80,14 +59,25 @@ class TenPoses:
         def error_of(errors: Sequence[causes.Errors]) -> Array:
             return causes.rest_positions(robot, plan, home, errors) - table.desired
 
+        # table: values of the article
+        # plan: plan of the prototype for the ten poses, with the empirical model
+        # home: plan of the prototype for its home pose
         self.table, self.plan, self.home = table, plan, home
         typical = [{one.name: one.typical} for one in causes.PARAMETERS]
+        # model_error: error of the empirical model at the ten poses [m], shape (10, 3)
+        # dead_meter: actual minus desired positions that 1 m of dead length would cause [m], shape (10, 3)
         self.model_error, self.dead_meter, *off = error_of([{}, {causes.DEAD: 1.0}, *typical])
+        # name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3)
         self.trends = {parameter.name: error for parameter, error in zip(causes.PARAMETERS, off, strict=True)}
         models = causes.subsets(causes.PARAMETERS, MOST)
         found = sorted(causes.explanations(error_of, table.error, models), key=lambda one: one.rms)
+        # all explanations by one parameter, by two and by three parameters; each list is sorted by the remaining error
         self.explanations = [[one for one in found if len(one.parameters) == count + 1] for count in range(MOST)]
+        # imitated: share of a pulley radius's effect that errors of length offset and anchor height together can
+        # reproduce (ratio of vector norms)
+        # single_zero: standard deviations of the length offsets of all cables [m], shape (m,)
         self.imitated, self.single_zero = _limits(robot, error_of, plan, self.best(2))
+        # root mean square of the measured errors, over all coordinates [m]
         self.measured_rms = float(np.sqrt(np.mean(table.error**2)))
 
     def height_slope(self, error: Array) -> float:

@@ -117,9 +117,7 @@ def calibrate(
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
     model = model_of(model)
-    if log.swivel is not None or model.code == codes.STRAIGHT:
-        refuse_slanted(robot, only_platform=True)
-    _check_model(robot, model)
+    _check_model(robot, log, model)
     _check_frequencies(robot, log)
     callback(progress, "progress")
     robust = flag(robust, "robust")
@@ -185,7 +183,9 @@ def _active_sensors(log: WinchLog) -> Sensors:
     return log.sensors.replace(**{name: None for name, read in readings if read is None or np.isnan(read).all()})
 
 
-def _check_model(robot: Robot, model: CableModel) -> None:
+def _check_model(robot: Robot, log: WinchLog, model: CableModel) -> None:
+    if log.swivel is not None or model.code == codes.STRAIGHT:
+        refuse_slanted(robot, only_platform=True)
     if model.code not in (codes.CATENARY, codes.ELASTIC, codes.STRAIGHT):
         step = "Use Catenary(), or Straight() for a fit of the geometry alone."
         raise InvalidValueError("model", type(model).__name__, "Catenary(), Elastic() or Straight()", step)

@@ -222,21 +222,18 @@ _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
 class _Generator:
-    """Symmetry: a change of all parameters together that changes no reading.
-
-    Attributes:
-        name: Name of the quantity.
-        step: Measurement that fixes the quantity.
-        change: Changes of the parameters, as rows of `kernels.calibration.kinds` (KIND_ROWS, m); of logarithms where
-            estimated.
-        lengths: Relative change of the lengths off the drums.
-    """
+    """Symmetry: a change of all parameters together that changes no reading."""
 
     def __init__(
         self, cables: int, name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0
     ) -> None:
         """Symmetry of a robot with a number of `cables`; `changes`: rows with their values."""
+        # name: name of the quantity
+        # step: measurement that fixes the quantity
+        # lengths: relative change of the lengths off the drums
         self.name, self.step, self.lengths = name, step, lengths
+        # changes of the parameters, as rows of `kernels.calibration.kinds` (KIND_ROWS, m); of logarithms where
+        # estimated
         self.change = np.zeros((kinds.KIND_ROWS, cables))
         for rows, values in changes:
             self.change[rows] = values

@@ -120,24 +120,7 @@ def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
 
 
 class MachineTerms:
-    """A robot with parameter values and its sensors, as arrays for the kernel.
-
-    Attributes:
-        model: Cable model.
-        parameters: Unknowns.
-        robot: The robot with the parameter values.
-        sensors: The sensors.
-        offset: Offset of reported lengths [m], (m,).
-        scale: Scale of reported lengths, (m,).
-        late: Times by which the reported lengths are late [s], (m,).
-        swivel_zero: Readings of swivel angles of cables along x [rad], (m,).
-        drums: Drums if counts are read; else None.
-        terms: Cable model in the form of the kernel.
-        body: `body_table`.
-        cables: `cable_table`.
-        sensing: Sensors in the form of the kernel.
-        slopes: Derivatives of the values by the internal parameters, (P,).
-    """
+    """A robot with parameter values and its sensors, as arrays for the kernel."""
 
     def __init__(
         self,
@@ -154,8 +137,9 @@ class MachineTerms:
         if sensors.swivel_deviation is not None:  # an angle about an axis that rotates with the platform
             refuse_slanted(robot, only_platform=True)
         self.robot, self.model, given = robot, model, (offset, scale, late, swivel_zero)
+        # offset [m], scale and lateness [s] of reported lengths; swivel_zero: angles of cables along x [rad]; (m,) each
         self.offset, self.scale, self.late, self.swivel_zero = (np.broadcast_to(x, robot.cable_count) for x in given)
-        self.drums = Drums(robot) if parameters.counted else None
+        self.drums = Drums(robot) if parameters.counted else None  # needed for counts
         self.terms: ForwardTerms = (model.code, *model.parameters, has_routing(robot) or None)
         self.body, self.cables = body_table(robot), cable_table(robot, slanted=True)
         self._take_sensors(sensors)
@@ -174,6 +158,7 @@ class MachineTerms:
         radii, plain = (parameters.where[kinds.RADIUS] >= 0).any(), self.cables.shape[2] == tables.CABLE_COLUMNS
         if radii and plain and winches is not None and winches.swivel_axis[:, :2].any():
             self.cables = locked(slanted_rows(self.robot)[None])  # eyelets that may become pulleys
+        # slopes: derivatives of the values by the internal parameters, (P,)
         self.parameters, self.slopes = parameters, slopes_of_values(self.robot, parameters)
 
     def with_sensors(self, sensors: Sensors) -> MachineTerms:

@@ -379,13 +379,7 @@ _WIDE: Final = 1e3  # largest used prior deviation, in multiples of the usual de
 
 
 class PriorUnits:
-    """Units in which directions are computed: standard deviations of the priors.
-
-    Attributes:
-        scale: One standard deviation in the internal parameters, (P,).
-        units: One standard deviation in the units of the parameters, (P,).
-        free: Indices of the parameters that do not count as known.
-    """
+    """Units in which directions are computed: standard deviations of the priors."""
 
     def __init__(self, parameters: Parameters) -> None:
         """Unit of each parameter: its prior deviation or, without a prior, the usual deviation of an unknown value."""
@@ -393,8 +387,9 @@ class PriorUnits:
         size = np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
         usual = parameters.usual_deviation * size
         units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
-        self.units = np.minimum(units, _WIDE * usual)
-        self.scale = self.units / size
+        self.units = np.minimum(units, _WIDE * usual)  # one standard deviation in the units of the parameters, (P,)
+        self.scale = self.units / size  # one standard deviation in the internal parameters, (P,)
         common = np.array([KINDS[name].deviation for name in parameters.names])
         fixed = parameters.stated & (self.scale < _FIXED * common)
+        # indices of the parameters that do not count as known
         self.free: Indices = np.flatnonzero(~fixed).astype(np.int64)

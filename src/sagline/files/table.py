@@ -37,15 +37,7 @@ CsvRow: TypeAlias = tuple[int, list[str]]  # line number in the file, from 1, an
 
 
 class CsvTable:
-    """Table with columns of numbers in SI.
-
-    Attributes:
-        path: The file, for messages.
-        columns: Name and numbers of each column, shape (rows,).
-        lines: Line number of each row in the file, from 1.
-        header: Line number of the header.
-        plain: Names of columns without a unit in the header; the values are in SI.
-    """
+    """Table with columns of numbers in SI."""
 
     def __init__(
         self,
@@ -58,6 +50,9 @@ class CsvTable:
         """Read the rows of a table; the first row contains the names of the columns, `name` or `name [unit]`."""
         found: dict[str, float | None] = {}
         numbers, lines = array("d"), array("q")
+        # path: the file, for messages
+        # lines: line number of each row in the file, from 1
+        # header: line number of the header
         self.path, self.lines, self.header = path, lines, 0
         for line, row in rows:
             if not found:
@@ -71,9 +66,11 @@ class CsvTable:
         values = np.array(numbers).reshape(len(lines), len(found))
         factors = [1.0 if factor is None else factor for factor in found.values()]
         with np.errstate(over="ignore"):  # a later check reports values that are too large
+            # name and numbers of each column, shape (rows,)
             self.columns = {
                 name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))
             }
+        # names of columns without a unit in the header; the values are in SI
         self.plain = frozenset(name for name, factor in found.items() if factor is None)
         for name, column in self.columns.items():
             wrong = np.isinf(column) if name in gaps else ~np.isfinite(column)

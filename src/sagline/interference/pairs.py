@@ -120,15 +120,7 @@ Body = _CablePart | int  # part of a cable, -1 for the platform, or number of an
 
 
 class Pairs:
-    """Pairs of numbered bodies: first all parts of cables, then the platform (even without shape), then obstacles.
-
-    Attributes:
-        parts: Parts of cables that occur in pairs.
-        by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
-        with_mesh: Numbers of the pairs with at least one mesh, shape (Q, 2).
-        names: Names of all pairs, in the order of their numbers.
-        left_out: Pairs that are not measured, with the reasons.
-    """
+    """Pairs of numbered bodies: first all parts of cables, then the platform (even without shape), then obstacles."""
 
     def __init__(
         self, robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
@@ -172,8 +164,13 @@ class Pairs:
         other = [pair for pair in found if any(isinstance(form(one), Mesh) for one in pair)]
         plain = [in_order(pair) for pair in found if pair not in other]
         numbers = (np.array([[number(a), number(b)] for a, b in some], dtype=np.int64) for some in (plain, other))
+        # by_kernel: numbers of the pairs that kernels measure, shape (P, 2)
+        # with_mesh: numbers of the pairs with at least one mesh, shape (Q, 2)
         self.by_kernel, self.with_mesh = (locked(array.reshape(-1, 2)) for array in numbers)
+        # names of all pairs, in the order of their numbers
         self.names = tuple((name(a), name(b)) for a, b in plain + other)
+        # parts: parts of cables that occur in pairs
+        # left_out: pairs that are not measured, with the reasons
         self.parts, self.left_out = parts, tuple(left_out)
 
 
@@ -203,17 +200,12 @@ _FACES: Final = np.reshape([int(n) for n in "01303246747504505123727602606415717
 
 
 class _Solid:
-    """A body for fcl.
-
-    Attributes:
-        geometry: Geometry of the body.
-        radius: Radius of a rod or ball, which is subtracted from distances [m].
-        mesh: Triangles of the body; None for rods and balls.
-        inner: Point inside the body [m].
-        place: Rotation and position of a body at rest.
-    """
+    """A body for fcl."""
 
     def __init__(self, fcl: ModuleType, form: Obstacle | None) -> None:
+        # radius: radius of a rod or ball, which is subtracted from distances [m]
+        # mesh: triangles of the body; None for rods and balls
+        # place: rotation and position of a body at rest
         self.radius, self.mesh, self.place = 0.0, None, (np.eye(3), np.zeros(3))
         if isinstance(form, Box):
             form = Mesh(_SIGNS * form.size @ form.orientation.T + form.center, _FACES, form.name)
@@ -225,9 +217,10 @@ class _Solid:
             return
         assert isinstance(form, Capsule | Sphere)
         ends = (form.start, form.end) if isinstance(form, Capsule) else (form.center, form.center)
+        # inner: point inside the body [m]
         self.radius, self.inner = form.radius, ends[0]
         self.place, length = _along(*ends)
-        self.geometry = fcl.Capsule(0.0, length)
+        self.geometry = fcl.Capsule(0.0, length)  # geometry of the body
 
 
 _Nearest = tuple[float, float, Array, Array]

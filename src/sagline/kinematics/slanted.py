@@ -160,11 +160,9 @@ def _solve_on_platform(
 
 
 def with_eyelets(state: Equilibrium) -> Equilibrium:
-    """Single equilibrium of the same cables with eyelets at the exit points; `state` itself if all axes are vertical.
-
-    The robot of the result has the chords of the free spans. Its wrench includes the weight that cables take off a
-    platform with winches; see `_weight_taken`.
-    """
+    """Equilibrium of the same cables with eyelets at the exit points; `state` itself if all axes are vertical."""
+    # The robot of the result has the chords of the free spans. Its wrench includes the weight that cables take off a
+    # platform with winches; see `_weight_taken`.
     robot, pose, cables = state.one_robot, state.pose, state.cables
     if not has_slanted_axes(robot):
         return state

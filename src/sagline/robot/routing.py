@@ -43,33 +43,29 @@ _Routing: TypeAlias = tuple[Array, Array, Array]
 
 
 class _ExitState:
-    """Cables at their exit points P, fields of shape (K,).
-
-    Attributes:
-        tension: T_A at the exit point P [N].
-        weight: w [N/m]; 0 for a cable model without weight between P and the drum.
-        stiffness: EA [N].
-        wrap: psi [rad].
-        sine: sin psi.
-        tangent: Unit tangent at P, toward the platform, shape (K, 3).
-        radius: R [m].
-        entry: +1 for a cable that enters its pulley from below, -1 from above.
-        friction: mu; negative while paying out, 0 at rest.
-        rolling: 1 + f while winding in, 1 - f while paying out, 1 at rest.
-    """
+    """Cables at their exit points P, fields of shape (K,)."""
 
     def __init__(self, state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cable: Indices) -> None:
         contact = state.contact
         assert contact is not None
         material, exact = robot.cables, state.cables.model.code == codes.CATENARY
+        # tension: T_A at the exit point P [N]
+        # stiffness: EA [N]
         self.tension, self.stiffness = _exit_tension(state)[known], material.axial_stiffness[cable]
+        # w [N/m]; 0 for a cable model without weight between P and the drum
         self.weight = material.linear_density[cable] * robot.gravity * exact
+        # wrap: psi [rad]
+        # entry: +1 for a cable that enters its pulley from below, -1 from above
         self.wrap, self.entry = contact.wrap_angle[known], winches.swivel_axis[cable, 2]
+        # sine: sin psi
+        # radius: R [m]
         self.sine, self.radius = np.sin(self.wrap), winches.pulley_radius[cable]
         across = self.sine[:, None] * outward(robot, state.pose)[known][:, :2]
+        # unit tangent at P, toward the platform, shape (K, 3)
         self.tangent = np.concatenate((across, (self.entry * np.cos(self.wrap))[:, None]), axis=-1)
         sign = np.zeros(self.wrap.shape) if contact.winding is None else contact.winding[known]
-        self.friction = sign * winches.pulley_friction[cable]
+        self.friction = sign * winches.pulley_friction[cable]  # mu; negative while paying out, 0 at rest
+        # 1 + f while winding in, 1 - f while paying out, 1 at rest
         self.rolling = 1.0 + sign * winches.rolling_friction[cable]
 
     def entering(self, bend: Array) -> Array:

@@ -62,27 +62,18 @@ STEP: Final = "Free some space or correct the permissions, and run the same swee
 
 
 class SweepFolder:
-    """Open folder of a sweep.
-
-    Attributes:
-        path: The folder.
-        group: Zarr group.
-        request: The request.
-        digest: Digest of the request.
-        size: Numbers of poses and wrenches in a task; a task has one robot.
-        made_by: Version of sagline that created the folder.
-    """
+    """Open folder of a sweep."""
 
     def __init__(self, path: Path) -> None:
         """Open the folder of a sweep and read the request; raises FileError for a missing or damaged sweep."""
         import zarr
 
-        self.path = path
+        self.path = path  # the folder
         check_package("zarr", "sweeps")
         if not path.is_dir():
             raise FileError(path, "is not a folder", FORMAT.give)
         try:
-            self.group: Group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)
+            self.group: Group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)  # zarr group
             attributes: dict[str, Any] = dict(self.group.attrs)
             given: dict[str, Any] = {name: self.group[name] for name in GIVEN}
         except (OSError, ValueError, KeyError, TypeError):
@@ -90,6 +81,7 @@ class SweepFolder:
         FORMAT.check(path, attributes)
         try:
             texts = list(attributes["robots"])
+            # the request
             self.request = Request(
                 [parse_robot(text, f"{path}, robot {k}") for k, text in enumerate(texts)],
                 Pose.from_quaternion(given["position"][:], given["quaternion"][:]),
@@ -100,7 +92,10 @@ class SweepFolder:
                 around=_set_of(attributes["around"]),
                 moment_arm=attributes["moment_arm"],
             )
+            # numbers of poses and wrenches in a task; a task has one robot
             self.size = int(attributes["task_poses"]), int(attributes["task_wrenches"])
+            # digest: digest of the request
+            # made_by: version of sagline that created the folder
             self.made_by, self.digest = str(attributes["source"]), str(attributes["digest"])
         except (KeyError, ValueError, TypeError, RuntimeError, OSError) as error:
             if isinstance(error, InvalidValueError):

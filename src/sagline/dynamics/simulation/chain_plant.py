@@ -24,17 +24,12 @@ from sagline.robot.batch import refuse_slanted
 
 
 class _LoadedPlatform:
-    """Platform together with point masses at its cable ends ("whole body"), in the principal axes of the whole body.
-
-    Attributes:
-        inertia: Mass and principal moments of the whole body, (4,); infinite for a blocked rotation.
-        center: Center of the whole body relative to the platform's center of mass, platform axes [m], (3,).
-        axes: Principal axes of the whole body in the principal axes of the platform, one per column, (3, 3).
-    """
+    """Platform together with point masses at its cable ends ("whole body"), in the principal axes of the whole body."""
 
     def __init__(self, inertia: Array, masses: Array, ends: Array) -> None:
         """Body of a platform with point masses at its cable ends; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
         mass = inertia[0] + masses.sum()
+        # center of the whole body relative to the platform's center of mass, platform axes [m], (3,)
         self.center = center = (masses @ ends) / mass
         turns = np.isfinite(inertia[1:])
         own = np.diag(np.where(turns, inertia[1:], 0.0))
@@ -44,6 +39,8 @@ class _LoadedPlatform:
             axes[:, 0] *= np.sign(np.linalg.det(axes))
         else:  # a planar motion, about the last axis, or no rotation
             moments, axes = np.where(turns, np.diag(whole), np.inf), np.eye(3)
+        # inertia: mass and principal moments of the whole body, (4,); infinite for a blocked rotation
+        # axes: principal axes of the whole body in the principal axes of the platform, one per column, (3, 3)
         self.inertia, self.axes = np.array([mass, *moments]), axes
 
     def levers(self, ends: Array) -> Array:

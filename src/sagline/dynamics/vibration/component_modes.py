@@ -59,49 +59,36 @@ class PlaneModes:
     """Fixed-end modes of the taut cables, either in the plane or normal to the plane, k modes per cable.
 
     The u unknowns of a cable are displacements times the root of the node's mass.
-
-    Attributes:
-        rest: Quasi-static shape of the nodes for a displaced platform end, shape (t, u, d).
-        square: Angular frequencies squared, ascending [1/s^2], shape (t, k).
-        shape: Mode shapes at the nodes, shape (t, u, k).
-        drive: Modal force per acceleration of the platform end, shape (t, k, d).
     """
 
     def __init__(self, matrix: Array, rest: Array, free: Flags, first: int) -> None:
         """Solve the eigenproblem without the unknowns that are fixed in all cables."""
         last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
-        self.rest = rest
+        self.rest = rest  # quasi-static shape of the nodes for a displaced platform end, shape (t, u, d)
+        # square: angular frequencies squared, ascending [1/s^2], shape (t, k)
         self.square, own = np.linalg.eigh(matrix[:, first:last, first:last])
-        self.shape = np.zeros((*matrix.shape[:2], last - first))
+        self.shape = np.zeros((*matrix.shape[:2], last - first))  # mode shapes at the nodes, shape (t, u, k)
         self.shape[:, first:last] = own
+        # modal force per acceleration of the platform end, shape (t, k, d)
         self.drive = np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last]
 
 
 class CableComponents:
-    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first.
-
-    Attributes:
-        square: Squared angular frequencies [1/s^2], shape (T,).
-        cable: Cable index of each mode, shape (T,).
-        participation: Modal force per acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)].
-        still: M_0, mass of every cable for quasi-static motion of its end, world axes, shape (m, 3, 3) [kg].
-        plane: Modes in the cables' planes, grouped by cable.
-        normal: Modes normal to the planes.
-        taut: Indices of the taut cables, shape (t,).
-        table: Rows of the taut cables in the table of strings, shape (t, STRING_COLUMNS).
-        axes: Horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3).
-        omega: Highest angular frequency for which the nodes are dense enough [rad/s].
-        points: Material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6).
-    """
+    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first."""
 
     def __init__(self, strings: Strings, row: int, up_to: float) -> None:
         """Cable modes of the state `row`, accurate up to `up_to` [Hz]. Higher modes only complete the basis."""
+        # taut: indices of the taut cables, shape (t,)
+        # omega: highest angular frequency for which the nodes are dense enough [rad/s]
         self.omega, self.taut = 2.0 * np.pi * up_to, np.flatnonzero(strings.taut[row])
+        # rows of the taut cables in the table of strings, shape (t, STRING_COLUMNS)
         self.table = np.ascontiguousarray(strings.table[row, self.taut])
+        # horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3)
         self.axes = axes = strings.axes[row, self.taut]
         counts = np.empty(self.taut.size, dtype=np.int64)
         spectral.node_counts(self.table, self.omega, counts)
         t, n = self.taut.size, int(counts.max(initial=2))
+        # points: material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6)
         self.points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
         plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
         spectral.spectral_matrices(self.table, self.omega, _lobatto(), self.points, plane, normal, carried, mass)
@@ -109,11 +96,17 @@ class CableComponents:
         first = 0 if self.table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
         inside = PlaneModes(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
         aside = PlaneModes(normal, carried[:, :, 4:], free, first)
+        # plane: modes in the cables' planes, grouped by cable
+        # normal: modes normal to the planes
         self.plane, self.normal = inside, aside
+        # squared angular frequencies [1/s^2], shape (T,)
         self.square = np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1)))
+        # cable index of each mode, shape (T,)
         self.cable = np.concatenate([np.repeat(self.taut, modes.square.shape[1]) for modes in (inside, aside)])
         swings, sways = inside.drive @ axes[:, ::2], aside.drive @ axes[:, 1:2]
+        # modal force per acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)]
         self.participation = np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3)))
+        # M_0, mass of every cable for quasi-static motion of its end, world axes, shape (m, 3, 3) [kg]
         self.still = _still(mass, axes, self.taut, strings.taut.shape[1])
 
     @property

@@ -21,42 +21,26 @@ _TINY = np.finfo(float).tiny
 
 
 class _CatenaryState:
-    """Cables in their planes, fields of shape (..., m).
-
-    Attributes:
-        h: Horizontal force [N].
-        a: Vertical force at the frame end [N].
-        b: Vertical force at the platform end [N].
-        size_a: Tension at the frame end [N].
-        size_b: Tension at the platform end [N].
-        weight: Weight per length [N/m].
-        length: Unstrained length [m].
-        product: N_A N_B, product of the tensions at the ends [N^2].
-        slope: Mean slope (V_A + V_B)/(N_A + N_B).
-        smooth: True for nearly straight cables.
-    """
+    """Cables in their planes, fields of shape (..., m)."""
 
     def __init__(self, cables: CableState, weight: Array) -> None:
+        # weight: weight per length [N/m]
+        # length: unstrained length [m]
         self.weight, self.length = weight, cables.unstrained_length
+        # h: horizontal force [N]
+        # b: vertical force at the platform end [N]
         self.h, self.b = cables.horizontal_tension, cables.vertical_force
-        self.a = self.b - weight * self.length
+        self.a = self.b - weight * self.length  # vertical force at the frame end [N]
+        # size_a: tension at the frame end [N]
+        # size_b: tension at the platform end [N]
         self.size_a, self.size_b = np.hypot(self.h, self.a), np.hypot(self.h, self.b)
-        self.product = self.size_a * self.size_b
-        self.slope = (self.a + self.b) / (self.size_a + self.size_b)
-        self.smooth = weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
+        self.product = self.size_a * self.size_b  # N_A N_B, product of the tensions at the ends [N^2]
+        self.slope = (self.a + self.b) / (self.size_a + self.size_b)  # mean slope (V_A + V_B)/(N_A + N_B)
+        self.smooth = weight * self.length <= _SMOOTH * (self.size_a + self.size_b)  # true for nearly straight cables
 
 
 class Flexibility:
-    """Derivatives of the displacement of a cable's platform end per force, without pulleys and dead length.
-
-    Attributes:
-        by_force: With respect to the force on the platform end, symmetric in all axes [m/N^2], shape
-            (..., m, 3, 3, 3).
-        by_length: With respect to the length of cable added at the frame end [1/N], shape (..., m, 3, 3).
-        by_density: With respect to the linear density [m^2/(N kg)], shape (..., m, 3, 3).
-        by_stiffness: With respect to the axial stiffness [m/N^2], shape (..., m, 3, 3).
-        stretch: Stretch part: integral of t t^T/EA ds with the tangent t [m/N], shape (..., m, 3, 3).
-    """
+    """Derivatives of the displacement of a cable's platform end per force, without pulleys and dead length."""
 
     def __init__(self, state: Equilibrium, force: Array) -> None:
         """Derivatives of the free spans; `force`: on the platform ends, (..., m, 3) [N]."""
@@ -77,9 +61,14 @@ class Flexibility:
             return np.asarray(np.swapaxes(axes, -1, -2) @ held @ axes)
 
         by_force = np.where(slack[..., None, None, None], 0.0, by_force)
+        # with respect to the force on the platform end, symmetric in all axes [m/N^2], shape (..., m, 3, 3, 3)
         self.by_force = np.einsum("...abc,...ai,...bj,...ck->...ijk", by_force, axes, axes, axes, optimize=True)
+        # by_length: with respect to the length of cable added at the frame end [1/N], shape (..., m, 3, 3)
+        # by_density: with respect to the linear density [m^2/(N kg)], shape (..., m, 3, 3)
         self.by_length, self.by_density = world(by_length), gravity * world(by_weight)
+        # with respect to the axial stiffness [m/N^2], shape (..., m, 3, 3)
         self.by_stiffness = world(np.eye(3) * (-length / stiffness**2)[..., None, None])
+        # stretch part: integral of t t^T/EA ds with the tangent t [m/N], shape (..., m, 3, 3)
         self.stretch = world(outer / stiffness[..., None, None])
 
 

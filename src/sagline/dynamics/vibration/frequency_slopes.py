@@ -249,16 +249,7 @@ class _StringData(NamedTuple):
 
 
 class _Waves:
-    """Waves of a cable due to unit forces on its frame end: displacement and force for each component of the force.
-
-    Attributes:
-        force: Force in the cable at rest, shape (P, 3) [N].
-        below: Length from the point to the platform end, shape (P,) [m].
-        share: Length of cable that the point represents, shape (P,) [m].
-        moved: Displacement, one column per force component, shape (P, 3, 3).
-        pulled: Change of the force, shape (P, 3, 3).
-        end: Displacement and force at the platform end, shape (2, 3, 3).
-    """
+    """Waves of a cable due to unit forces on its frame end: displacement and force for each component of the force."""
 
     def __init__(self, cable: _StringData, omega: float) -> None:
         """Solve by collocation at Gauss points of the cable's elements."""
@@ -281,8 +272,13 @@ class _Waves:
             within_each[e] = stages[e] @ at
             at = across[e] @ at
         found = within_each.reshape(-1, 6, 3)
+        # force: force in the cable at rest, shape (P, 3) [N]
+        # below: length from the point to the platform end, shape (P,) [m]
         self.force, self.below = force.reshape(-1, 3), below.reshape(-1)
-        self.share = (size[:, None] * WEIGHTS).reshape(-1)
+        self.share = (size[:, None] * WEIGHTS).reshape(-1)  # length of cable that the point represents, shape (P,) [m]
+        # moved: displacement, one column per force component, shape (P, 3, 3)
+        # pulled: change of the force, shape (P, 3, 3)
+        # end: displacement and force at the platform end, shape (2, 3, 3)
         self.moved, self.pulled, self.end = found[:, :3], found[:, 3:], at.reshape(2, 3, 3)
 
 

@@ -230,15 +230,7 @@ BELOW = 6.0  # ratio of the lowest mode frequency to the start of the curves
 
 
 class ResponseCurves:
-    """Response curves with and without cable mass, for the same force.
-
-    Attributes:
-        frequency: Frequencies [Hz], ascending, shape (F,).
-        with_mass: Amplitude of motion per force, with cable mass, in `unit`, shape (F,).
-        massless: Amplitude with massless cables, shape (F,).
-        static: Motion per static force.
-        unit: Unit of all responses.
-    """
+    """Response curves with and without cable mass, for the same force."""
 
     def __init__(self, response: FrequencyResponse, force: str = "x", motion: str | None = None) -> None:
         """Curves of one element of a `FrequencyResponse`, within the range of logarithmic axes."""
@@ -249,8 +241,12 @@ class ResponseCurves:
         if len(kept) < 2:
             step = "Give more frequencies, for instance np.geomspace(0.5, 20.0, 500)."
             raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "at least two", step)
-        self.static = abs(float(stiffness(response.state).compliance[row, column]))
+        self.static = abs(float(stiffness(response.state).compliance[row, column]))  # motion per static force
+        # frequency: frequencies [Hz], ascending, shape (F,)
+        # unit: unit of all responses
         self.frequency, self.unit = locked(response.frequency[kept]), UNITS[row > 2, column > 2]
+        # with_mass: amplitude of motion per force, with cable mass, in `unit`, shape (F,)
+        # massless: amplitude with massless cables, shape (F,)
         self.with_mass, self.massless = (locked(receptance[kept]) for receptance in answers)
 
     @classmethod

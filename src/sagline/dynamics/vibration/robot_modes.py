@@ -25,26 +25,23 @@ _TINY = 1e-300
 
 
 class VibrationModel:
-    """Stiffness, mass and cables of N states, for the computation of vibrations.
-
-    Attributes:
-        strings: Data of the cables.
-        ends: Matrices that map the platform motion to the motion of the platform ends, shape (N, m, 3, 6).
-        stiffness: Stiffness of the platform, symmetric, shape (N, 6, 6).
-        mass: Mass matrix of the platform, shape (N, 6, 6).
-        freedom: Matrix that selects the free motions, shape (n, 6).
-    """
+    """Stiffness, mass and cables of N states, for the computation of vibrations."""
 
     def __init__(self, state: Equilibrium) -> None:
         """Model of one equilibrium or of N equilibria. The arrays have a leading axis in both cases."""
         slopes = cable_slopes(state)
         matrix = slopes.matrix.reshape(-1, 6, 6)
         levers = slopes.levers.reshape(len(matrix), -1, 3)
+        # strings: data of the cables
+        # ends: matrices that map the platform motion to the motion of the platform ends, shape (N, m, 3, 6)
+        # freedom: matrix that selects the free motions, shape (n, 6)
         self.strings, self.ends, self.freedom = (
             strings_of(state),
             motions_of_ends(levers),
             first_of(state.robot).freedom,
         )
+        # stiffness: stiffness of the platform, symmetric, shape (N, 6, 6)
+        # mass: mass matrix of the platform, shape (N, 6, 6)
         self.stiffness, self.mass = 0.5 * (matrix + np.swapaxes(matrix, -1, -2)), mass_matrix(state).reshape(-1, 6, 6)
 
     def massless_modes(self, row: int) -> tuple[Array, Array]:
@@ -92,16 +89,7 @@ class VibrationModel:
 
 
 class ReducedModel:
-    """Eigenproblem of one state for its modes below a frequency.
-
-    Attributes:
-        matrix: Symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2].
-        platform: Matrix that maps the first n unknowns to platform motions, shape (6, n).
-        driven: Matrix that maps the first n unknowns to the excitation of the cable modes, shape (k, n).
-        kept: Mask of the components that are unknowns themselves, shape (T,).
-        beyond: Other components as combinations of the last b unknowns, shape (T - kept, b).
-        components: Fixed-end modes of the cables.
-    """
+    """Eigenproblem of one state for its modes below a frequency."""
 
     def __init__(self, model: VibrationModel, row: int, up_to: float) -> None:
         """Reduce the state `row` of the model, for modes below `up_to` [Hz]."""
@@ -128,7 +116,13 @@ class ReducedModel:
         matrix[:n, n:] = -pulled.T
         np.fill_diagonal(matrix[n : n + count, n : n + count], square)
         matrix[n + count :, n + count :] = slow
+        # matrix: symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2]
+        # platform: matrix that maps the first n unknowns to platform motions, shape (6, n)
+        # driven: matrix that maps the first n unknowns to the excitation of the cable modes, shape (k, n)
         self.matrix, self.platform, self.driven = matrix, freedom.T @ upper, driven
+        # kept: mask of the components that are unknowns themselves, shape (T,)
+        # beyond: other components as combinations of the last b unknowns, shape (T - kept, b)
+        # components: fixed-end modes of the cables
         self.kept, self.beyond, self.components = kept, beyond, components
 
     def amplitudes(self, vectors: Array) -> Array:

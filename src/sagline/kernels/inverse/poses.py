@@ -94,18 +94,14 @@ def distribute_and_solve_cables(
             break
         moved, largest = take_tensions(cables, balance)
         if exits is not None:
-            if placed:
-                away = 0.0
-            else:
-                before, away = away, move_exits(model, exits, platform, cables, balance, not solved)
-                placed = away * away <= NEXT_EXIT * before  # successive changes have a nearly constant ratio
+            before, away = away, 0.0 if placed else move_exits(model, exits, platform, cables, balance, not solved)
+            placed = away * away <= NEXT_EXIT * before  # successive changes have a nearly constant ratio
         gravest, turned = states.solve_cable_states(
             model, cables, not solved, solved and moved + away < states.NEAR, statuses
         )
-        if gravest == codes.CABLE_TOO_SLACK or gravest == codes.CABLE_NOT_CONVERGED:
-            status = codes.POSE_NOT_CONVERGED
-            break
         status = codes.POSE_NOT_CONVERGED
+        if gravest == codes.CABLE_TOO_SLACK or gravest == codes.CABLE_NOT_CONVERGED:
+            break
         change = sag_force_change(cables)
         converged = away <= SAME_EXIT and (
             model.code != codes.CATENARY
