@@ -103,15 +103,13 @@ class Experiment:
         ends: Array,
     ) -> None:
         """Evaluate observations at the stops, plans of the legs, and times (12,) of the ends of the legs."""
-        # table: values of the article
-        # robot: robot used by the controller
         self.table, self.robot, m = Table2(), controller.robot, controller.robot.cable_count
         true, estimated, tension, correction = (np.array(column) for column in zip(*stops[1:], strict=True))
         planned = np.array([plan.state.cables.frame_end_tension[-1] for plan in plans])
         seen = [
             control.null_space(plan.state[-1]).visible @ off for plan, off in zip(plans, tension - planned, strict=True)
         ]
-        # true: true positions of the platform at the ten stops [m], shape (10, 3)
+        # true positions of the platform at the ten stops [m], shape (10, 3)
         # estimated: positions estimated from the encoders at the stops [m], shape (10, 3)
         # tension: measured tensions at the stops, as means over a second [N], shape (10, m)
         self.true, self.estimated, self.tension = true[:-1], estimated[:-1], tension[:-1]
@@ -129,7 +127,7 @@ class Experiment:
         # lengths: lengths minus lengths at home [m], shape (K, m)
         # stops: times of the ten stops on the time axis `time`, shape (10,)
         self.time, self.lengths, self.stops = time[:, 0], lengths - plans[0].unstrained_length[0], ends[1:-1]
-        self.duration = PERIOD * watch.cycles  # duration from home to home, including stops [s]
+        self.duration = PERIOD * watch.cycles  # from home to home, including stops [s]
         rates = [plan.length_rate for plan in plans]
         # largest speed of a winch [m/s]
         self.winch_speed = max(float(np.abs(rate).max()) for rate in rates if rate is not None)
@@ -137,7 +135,7 @@ class Experiment:
         # misjudged: largest distance between true and estimated position [m]
         # acting: share of the cycles at stops in which the tension loop changes the lengths
         self.farthest, self.misjudged, self.acting = watch.farthest, watch.misjudged, watch.acted / watch.stood
-        self.events = controller.events  # events of the controller
+        self.events = controller.events
 
     @property
     def error(self) -> Array:

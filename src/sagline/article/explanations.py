@@ -117,7 +117,6 @@ class Explanation:
     def __init__(self, model: Model, values: Array, slopes: Array, predicted: Array, measured: Array) -> None:
         """Evaluate the fitted `values`; `slopes`: derivatives of the positions."""
         rest = measured - predicted
-        # parameters: the k parameters
         # values: errors of the parameters in their units, shape (k,)
         # predicted: actual minus desired position with these errors [m], shape (N, 3)
         self.parameters, self.values, self.predicted = model, values, predicted
@@ -125,11 +124,11 @@ class Explanation:
         # worst: largest distance of measured and predicted position [m]
         self.rms, self.worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
         low, high = _limits(model)
-        # true for errors that are at their plausible limit, shape (k,)
+        # errors that are at their plausible limit, shape (k,)
         self.at_limit: Flags = (values >= (1.0 - NEAR) * high) | (values <= low + NEAR * high)
         # standard deviations of the errors in their units, shape (k,); NaN at a limit
         self.deviation = _deviation(slopes, ~self.at_limit, rest)
-        # akaike's information criterion, corrected for few measurements. Smaller values are better. A difference of 2
+        # Akaike's information criterion, corrected for few measurements. Smaller values are better. A difference of 2
         # is not significant
         self.aicc = corrected_aic(self.rms, rest.size, len(model))
         # as `rms`, but the prediction of each pose comes from a fit to all other poses [m]

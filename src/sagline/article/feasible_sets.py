@@ -33,7 +33,6 @@ class FeasibleSets:
         # necessary. Source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
         if points % 4:
             raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
-        # cable: material
         # end: desired position B_d of the platform end
         # tolerance: epsilon_max of (20) [m]
         self.cable, self.end, self.tolerance = cable, end, tolerance

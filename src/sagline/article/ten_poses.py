@@ -23,7 +23,6 @@ class Table2:
         # source: Gia Luan & Truong Thinh 2020, Table 2
         text = files("sagline.article").joinpath("data/table2.csv").read_text(encoding="utf-8")
         rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))[1:]
-        # points: names of the ten poses
         self.points, numbers = tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
         self.desired: Array = locked(numbers[:, 0:3].copy())  # desired positions [m], shape (10, 3)
         self.actual: Array = locked(numbers[:, 3:6].copy())  # measured positions [m], shape (10, 3)
@@ -59,7 +58,6 @@ class TenPoses:
         def error_of(errors: Sequence[causes.Errors]) -> Array:
             return causes.rest_positions(robot, plan, home, errors) - table.desired
 
-        # table: values of the article
         # plan: plan of the prototype for the ten poses, with the empirical model
         # home: plan of the prototype for its home pose
         self.table, self.plan, self.home = table, plan, home
@@ -67,7 +65,7 @@ class TenPoses:
         # model_error: error of the empirical model at the ten poses [m], shape (10, 3)
         # dead_meter: actual minus desired positions that 1 m of dead length would cause [m], shape (10, 3)
         self.model_error, self.dead_meter, *off = error_of([{}, {causes.DEAD: 1.0}, *typical])
-        # name of a parameter: actual minus desired positions that its typical error would cause [m], (10, 3)
+        # by parameter: actual minus desired positions that its typical error would cause [m], shape (10, 3)
         self.trends = {parameter.name: error for parameter, error in zip(causes.PARAMETERS, off, strict=True)}
         models = causes.subsets(causes.PARAMETERS, MOST)
         found = sorted(causes.explanations(error_of, table.error, models), key=lambda one: one.rms)

@@ -228,7 +228,6 @@ class _Generator:
         self, cables: int, name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0
     ) -> None:
         """Symmetry of a robot with a number of `cables`; `changes`: rows with their values."""
-        # name: name of the quantity
         # step: measurement that fixes the quantity
         # lengths: relative change of the lengths off the drums
         self.name, self.step, self.lengths = name, step, lengths

@@ -50,9 +50,7 @@ class CsvTable:
         """Read the rows of a table; the first row contains the names of the columns, `name` or `name [unit]`."""
         found: dict[str, float | None] = {}
         numbers, lines = array("d"), array("q")
-        # path: the file, for messages
-        # lines: line number of each row in the file, from 1
-        # header: line number of the header
+        # lines: line number of each row in the file, from 1; path is for messages
         self.path, self.lines, self.header = path, lines, 0
         for line, row in rows:
             if not found:

@@ -220,7 +220,7 @@ class _Solid:
         # inner: point inside the body [m]
         self.radius, self.inner = form.radius, ends[0]
         self.place, length = _along(*ends)
-        self.geometry = fcl.Capsule(0.0, length)  # geometry of the body
+        self.geometry = fcl.Capsule(0.0, length)
 
 
 _Nearest = tuple[float, float, Array, Array]

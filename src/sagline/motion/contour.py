@@ -145,12 +145,11 @@ class _Timed:
         enter, cruise, leave = np.sqrt(before), np.sqrt(top), np.sqrt(after)
         even = np.maximum(moves.length - (2.0 * top - before - after) / (2.0 * acceleration), 0.0)
         steady = np.divide(even, cruise, out=np.zeros_like(even), where=cruise > 0.0)
-        # moves: the moves
         # enter: speed at the start [m/s], shape (M,)
         # cruise: largest speed [m/s], shape (M,)
         # leave: speed at the end [m/s], shape (M,)
         self.moves, self.enter, self.cruise, self.leave = moves, enter, cruise, leave
-        self.duration = (2.0 * cruise - enter - leave) / acceleration + steady + moves.dwell  # duration [s], shape (M,)
+        self.duration = (2.0 * cruise - enter - leave) / acceleration + steady + moves.dwell  # [s]
 
 
 def samples_along(blocks: Iterable[Moves], acceleration: float, rate: float, most: float) -> Iterator[Samples]:

@@ -68,12 +68,12 @@ class SweepFolder:
         """Open the folder of a sweep and read the request; raises FileError for a missing or damaged sweep."""
         import zarr
 
-        self.path = path  # the folder
+        self.path = path
         check_package("zarr", "sweeps")
         if not path.is_dir():
             raise FileError(path, "is not a folder", FORMAT.give)
         try:
-            self.group: Group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)  # zarr group
+            self.group: Group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)
             attributes: dict[str, Any] = dict(self.group.attrs)
             given: dict[str, Any] = {name: self.group[name] for name in GIVEN}
         except (OSError, ValueError, KeyError, TypeError):
@@ -81,7 +81,6 @@ class SweepFolder:
         FORMAT.check(path, attributes)
         try:
             texts = list(attributes["robots"])
-            # the request
             self.request = Request(
                 [parse_robot(text, f"{path}, robot {k}") for k, text in enumerate(texts)],
                 Pose.from_quaternion(given["position"][:], given["quaternion"][:]),
@@ -94,7 +93,6 @@ class SweepFolder:
             )
             # numbers of poses and wrenches in a task; a task has one robot
             self.size = int(attributes["task_poses"]), int(attributes["task_wrenches"])
-            # digest: digest of the request
             # made_by: version of sagline that created the folder
             self.made_by, self.digest = str(attributes["source"]), str(attributes["digest"])
         except (KeyError, ValueError, TypeError, RuntimeError, OSError) as error:

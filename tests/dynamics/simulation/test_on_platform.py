@@ -9,6 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
+from tests.dynamics.simulation.test_slanted import check_that_small_swings_have_a_frequency_of_the_modes
 from tests.kinematics.test_on_platform import POSE, ROBOTS
 from tests.kinematics.test_slanted import four_cables
 
@@ -69,17 +70,7 @@ def test_small_swings_have_the_frequencies_of_the_modes() -> None:
     winches = sl.Winch(
         0.03, swivel_axis=[[1, 0, 1], [-1, 0, 1], [-1, 0, 1], [1, 0, 1]], dead_cable=0.2, on_platform=True
     )
-    robot = four_cables().replace(winches=winches)
-    state = sl.inverse(robot, sl.Pose.from_euler([0.1, 0.05, 1.3], 0.0, 0.0, 0.0)).state
-    lowest = float(sl.modes(state).frequency[0])
-    push = ([0.0, 0.01, 0.02], np.outer([0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.02]))
-    run = sl.simulate(state, wrench=push, duration=8.0 / lowest, record=0.02 / lowest)
-    turned = (run.pose.rotation * state.pose.rotation.inv()).as_rotvec()
-    shape = np.linalg.svd(turned - turned.mean(axis=0), full_matrices=False)[2][0]
-    signal = turned @ shape * np.hanning(len(turned))
-    spectrum = np.abs(np.fft.rfft(signal, 32 * len(signal)))
-    found = np.fft.rfftfreq(32 * len(signal), run.time[1])[1 + int(spectrum[1:].argmax())]
-    assert np.abs(sl.modes(state).frequency / found - 1.0).min() < 5e-3
+    check_that_small_swings_have_a_frequency_of_the_modes(four_cables().replace(winches=winches))
 
 
 def test_the_simulator_holds_a_robot_at_its_lengths() -> None:

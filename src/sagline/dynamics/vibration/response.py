@@ -242,8 +242,7 @@ class ResponseCurves:
             step = "Give more frequencies, for instance np.geomspace(0.5, 20.0, 500)."
             raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "at least two", step)
         self.static = abs(float(stiffness(response.state).compliance[row, column]))  # motion per static force
-        # frequency: frequencies [Hz], ascending, shape (F,)
-        # unit: unit of all responses
+        # ascending frequencies [Hz], shape (F,), and the unit of all responses
         self.frequency, self.unit = locked(response.frequency[kept]), UNITS[row > 2, column > 2]
         # with_mass: amplitude of motion per force, with cable mass, in `unit`, shape (F,)
         # massless: amplitude with massless cables, shape (F,)
